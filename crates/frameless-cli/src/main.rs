@@ -1,0 +1,2 @@
+//! `frameless`
+fn main() {}

@@ -1,0 +1,259 @@
+//! The scene as plain, checked data: arrays that refer to each other by index.
+//!
+//! A [`Scene`] comes from a glTF file or from the built-in suite; once it exists every index is in bounds, every number
+//! finite, every node after its parent. What moves is told by [`Animation`]; [`Scene::state_at`] evaluates it.
+
+use glam::{Affine3A, Quat, Vec2, Vec3, Vec4};
+
+use crate::animation::Animation;
+
+/// Everything that can be seen, at all times.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// File name without folder, or the built-in scene's name.
+    pub name: String,
+    /// Shapes, each in coordinates of its own.
+    pub geometries: Vec<Geometry>,
+    /// How surfaces reflect light.
+    pub materials: Vec<Material>,
+    /// Images with the way they are looked up.
+    pub textures: Vec<Texture>,
+    /// Decoded pictures.
+    pub images: Vec<Image>,
+    /// The transform hierarchy; parents come before their children.
+    pub nodes: Vec<Node>,
+    /// Which geometry stands at which node. An instance's index is the object number of its samples.
+    pub instances: Vec<Instance>,
+    /// Views that the file offers; never empty after loading.
+    pub cameras: Vec<Camera>,
+    /// Light sources; may be empty only if `ambient` is not black.
+    pub lights: Vec<Light>,
+    /// Radiance that reaches every surface from everywhere, linear RGB.
+    pub ambient: Vec3,
+    /// Radiance of the sky straight down (x, y, z of `sky[0]`) and straight up (`sky[1]`), linear RGB; in
+    /// between: mixed by the direction's y.
+    pub sky: [Vec3; 2],
+    /// What moves.
+    pub animation: Animation,
+    /// What was ignored or replaced while loading, each said once.
+    pub warnings: Vec<String>,
+    /// What was added because the file had none ("no camera: framed the scene"), for the HUD and the log.
+    pub notes: Vec<String>,
+}
+
+/// A shape.
+#[derive(Clone, Debug)]
+pub enum Geometry {
+    /// Triangles.
+    Mesh(Mesh),
+    /// The sphere of radius 1 around the origin. Texture coordinates: u around the y axis from +x towards
+    /// +z, v from the north pole (+y, v = 0) to the south pole (v = 1).
+    Sphere {
+        /// Index into [`Scene::materials`].
+        material: u32,
+    },
+}
+
+/// Triangles with their attributes. Attribute arrays are as long as `positions`, or empty.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Finite.
+    pub positions: Vec<Vec3>,
+    /// Unit length; empty: flat shading.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates, set 0 and set 1.
+    pub uvs: [Vec<Vec2>; 2],
+    /// Linear RGBA that multiplies the base colour.
+    pub colors: Vec<Vec4>,
+    /// Three vertices each, counter-clockwise seen from the front; in bounds.
+    pub triangles: Vec<[u32; 3]>,
+    /// Index into [`Scene::materials`], per triangle.
+    pub triangle_materials: Vec<u32>,
+}
+
+/// A metallic-roughness surface (glTF 2.0 §3.9).
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// As in the file; may be empty.
+    pub name: String,
+    /// Linear RGBA.
+    pub base_color: Vec4,
+    /// Multiplies `base_color`; sRGB-encoded image.
+    pub base_color_texture: Option<TextureRef>,
+    /// 0: dielectric, 1: metal.
+    pub metallic: f32,
+    /// 0: mirror, 1: matte.
+    pub roughness: f32,
+    /// Linear RGB radiance given off.
+    pub emissive: Vec3,
+    /// Whether back faces are seen.
+    pub double_sided: bool,
+}
+
+impl Default for Material {
+    /// glTF's default material: white, metallic 1, roughness 1 per the specification; ours is a matte
+    /// white dielectric since that is what viewers show for primitives without a material.
+    fn default() -> Self {
+        Material {
+            name: String::new(),
+            base_color: Vec4::ONE,
+            base_color_texture: None,
+            metallic: 0.0,
+            roughness: 1.0,
+            emissive: Vec3::ZERO,
+            double_sided: false,
+        }
+    }
+}
+
+/// Which texture, with which of the mesh's texture coordinates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TextureRef {
+    /// Index into [`Scene::textures`].
+    pub texture: u32,
+    /// Index into [`Mesh::uvs`].
+    pub uv_set: u32,
+}
+
+/// An image and the way it is looked up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Texture {
+    /// Index into [`Scene::images`].
+    pub image: u32,
+    /// Outside [0, 1) horizontally and vertically.
+    pub wrap: [Wrap; 2],
+    /// Between texels.
+    pub filter: Filter,
+}
+
+/// What lies outside [0, 1).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// The image again.
+    #[default]
+    Repeat,
+    /// The image mirrored, then again.
+    MirroredRepeat,
+    /// The border texel.
+    ClampToEdge,
+}
+
+/// What lies between texel centres.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Filter {
+    /// The nearest texel.
+    Nearest,
+    /// The four texels around, by distance.
+    #[default]
+    Linear,
+}
+
+/// A decoded picture: row-major from the top, 8 bits per channel, sRGB-encoded RGB with linear alpha.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Image {
+    /// Texels per row; at least 1.
+    pub width: u32,
+    /// Rows; at least 1.
+    pub height: u32,
+    /// `width · height` texels.
+    pub rgba: Vec<[u8; 4]>,
+}
+
+/// A place in the transform hierarchy.
+#[derive(Clone, Debug)]
+pub struct Node {
+    /// As in the file; may be empty.
+    pub name: String,
+    /// Index into [`Scene::nodes`], smaller than this node's own.
+    pub parent: Option<u32>,
+    /// Where the node stands in its parent while nothing moves it.
+    pub rest: Transform,
+}
+
+/// Scale, then rotate, then translate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transform {
+    /// In metres.
+    pub translation: Vec3,
+    /// Unit quaternion.
+    pub rotation: Quat,
+    /// Per axis; may be negative.
+    pub scale: Vec3,
+}
+
+impl Transform {
+    /// No change.
+    pub const IDENTITY: Transform =
+        Transform { translation: Vec3::ZERO, rotation: Quat::IDENTITY, scale: Vec3::ONE };
+
+    /// As a matrix: parent from local.
+    pub fn affine(&self) -> Affine3A {
+        Affine3A::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
+    }
+}
+
+/// A geometry at a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Instance {
+    /// Index into [`Scene::nodes`].
+    pub node: u32,
+    /// Index into [`Scene::geometries`].
+    pub geometry: u32,
+}
+
+/// A camera at a node, looking along −z with +y up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// As in the file; may be empty.
+    pub name: String,
+    /// Index into [`Scene::nodes`].
+    pub node: u32,
+    /// How directions become pixels.
+    pub projection: Projection,
+}
+
+/// How directions become pixels. The picture's aspect ratio is that of the canvas, not of the file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// Angle between the top and the bottom of the picture, in radians.
+    Perspective {
+        /// In (0, π).
+        yfov_rad: f32,
+    },
+    /// Half the height of the visible box, in metres.
+    Orthographic {
+        /// Positive.
+        ymag: f32,
+    },
+}
+
+/// A punctual light (KHR_lights_punctual) at a node; spot and directional lights shine along −z.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// Index into [`Scene::nodes`].
+    pub node: u32,
+    /// Shape of the emission.
+    pub kind: LightKind,
+    /// Linear RGB: radiant intensity in W/sr (point, spot) or irradiance in W/m² (directional), up to the
+    /// photometric constant that exposure absorbs. A matte white surface facing a point light of
+    /// intensity I at distance r has radiance I / (π r²).
+    pub intensity: Vec3,
+    /// Beyond this distance in metres there is no light; infinite if the file does not say.
+    pub range: f32,
+}
+
+/// Shape of a light's emission.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightKind {
+    /// Into all directions.
+    Point,
+    /// Parallel light from infinitely far away.
+    Directional,
+    /// Into a cone.
+    Spot {
+        /// Cosine of the angle at which the light begins to fall off.
+        cos_inner: f32,
+        /// Cosine of the angle at which it is gone; smaller than `cos_inner`.
+        cos_outer: f32,
+    },
+}

@@ -1,0 +1,51 @@
+//! The contract between the loop and whoever decides which pixels are traced next.
+
+use crate::{Canvas, Request, Time};
+
+/// What became of one sample, as told to the sampler.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observation {
+    /// Which pixel was traced.
+    pub pixel: u32,
+    /// When it was traced.
+    pub now: Time,
+    /// When it had been traced before; [`Time::ZERO`] if never.
+    pub previous: Time,
+    /// d = Σₖ (newₖ − oldₖ)² over display-referred sRGB in [0, 1]: between 0 (nothing changed) and 3.
+    pub change: f32,
+}
+
+/// Chooses the pixels that are traced next.
+///
+/// The engine calls [`choose`](Sampler::choose) before every batch and [`observe`](Sampler::observe) once for the answers that have
+/// come since, in a fixed order. Between the two any number of other batches may have been chosen, and
+/// samples that were chosen may never be observed. Both are called from one thread.
+///
+/// The same calls give the same choices: all randomness comes from the seed given at construction.
+pub trait Sampler: Send {
+    /// Append `count` requests to `requests`. `canvas` is the picture so far; `now` is never earlier than
+    /// any time in it.
+    fn choose(&mut self, now: Time, canvas: &Canvas, count: usize, requests: &mut Vec<Request>);
+
+    /// Learn from samples that have just been written to the canvas.
+    fn observe(&mut self, observations: &[Observation]) {
+        let _ = observations;
+    }
+
+    /// What the sampler knows of the picture, for overlays and experiments. Slow; not for the loop.
+    fn inspect(&self, now: Time, canvas: &Canvas) -> Insight {
+        let _ = (now, canvas);
+        Insight::default()
+    }
+}
+
+/// A sampler's view of the picture. Empty where the sampler keeps no such thing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Insight {
+    /// Change d per pixel, row-major; in [0, 3].
+    pub change: Vec<f32>,
+    /// Probability per pixel that the next draw is this pixel, row-major; sums to 1.
+    pub probability: Vec<f32>,
+    /// Probability per pixel's tile that the next draw falls into the tile, row-major per pixel.
+    pub tile_probability: Vec<f32>,
+}

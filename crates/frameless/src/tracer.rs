@@ -1,0 +1,67 @@
+//! The renderer's side of the contract.
+
+use crate::{Answer, Batch};
+
+/// A renderer: takes batches of pixels, gives their colours back, now or later.
+///
+/// The engine calls [`submit`](Tracer::submit) with one batch after another and asks for what has become
+/// of them with [`collect`](Tracer::collect). Answers may come late, in any order, in part, or never: what does not come is
+/// chosen again, because its pixels grow old. On the simulated clock the engine waits for each batch before
+/// it chooses the next, so that results do not depend on how fast the renderer is.
+///
+/// A function of a batch is a tracer already:
+///
+/// ```
+/// use frameless::{Answer, Batch, Tracer};
+///
+/// let mut tracer = |batch: &Batch| -> Vec<[f32; 3]> {
+///     batch.requests.iter().map(|r| {
+///         let (x, y) = batch.size.xy(r.pixel);
+///         [x as f32, y as f32, batch.scene_secs.sin() as f32]
+///     }).collect()
+/// };
+/// # fn takes(_: &mut dyn Tracer) {}
+/// # takes(&mut frameless::Function::new(tracer));
+/// ```
+pub trait Tracer {
+    /// Take a batch. May trace it at once, hand it to other threads, or send it elsewhere.
+    fn submit(&mut self, batch: Batch);
+
+    /// The next answer, if there is one. With `wait`, wait for it as long as a batch is under way that may
+    /// still be answered; `None` then means that nothing more will come.
+    fn collect(&mut self, wait: bool) -> Option<Answer>;
+}
+
+impl<T: Tracer + ?Sized> Tracer for Box<T> {
+    fn submit(&mut self, batch: Batch) {
+        (**self).submit(batch)
+    }
+
+    fn collect(&mut self, wait: bool) -> Option<Answer> {
+        (**self).collect(wait)
+    }
+}
+
+/// A tracer made of a function from a batch to one linear RGB colour per request.
+pub struct Function<F> {
+    render: F,
+    answers: std::collections::VecDeque<Answer>,
+}
+
+impl<F: FnMut(&Batch) -> Vec<[f32; 3]>> Function<F> {
+    /// `render` returns one linear RGB colour per request of the batch, in the same order.
+    pub fn new(render: F) -> Self {
+        Function { render, answers: Default::default() }
+    }
+}
+
+impl<F: FnMut(&Batch) -> Vec<[f32; 3]>> Tracer for Function<F> {
+    fn submit(&mut self, batch: Batch) {
+        let rgb = (self.render)(&batch);
+        self.answers.push_back(Answer::to(batch, rgb, Vec::new()));
+    }
+
+    fn collect(&mut self, _wait: bool) -> Option<Answer> {
+        self.answers.pop_front()
+    }
+}
