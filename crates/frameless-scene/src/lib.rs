@@ -1,12 +1,16 @@
 //! What exists at time t: scenes as checked plain data, their animation, cameras and lights.
 
 mod animation;
+mod bounds;
 mod scene;
 mod state;
+mod view;
 
-pub use animation::{Animation, Channel, Interpolation, Target, Values};
+pub use animation::{AfterEnd, Animation, Channel, Interpolation, Target, Value, Values};
+pub use bounds::Bounds;
 pub use scene::{
     Camera, Filter, Geometry, Image, Instance, Light, LightKind, Material, Mesh, Node, Projection,
     Scene, Texture, TextureRef, Transform, Wrap,
 };
-pub use state::{State, View};
+pub use state::State;
+pub use view::{View, frame_bounds, look_at};

@@ -2,26 +2,19 @@
 
 use glam::{Affine3A, Vec3};
 
-use crate::{Projection, Scene};
+use crate::{Scene, Target, Transform, Value};
 
 /// A scene at one moment: where every node is and how bright every light. Made by [`Scene::state_at`].
 #[derive(Clone, Debug, Default)]
 pub struct State {
     /// The moment, in seconds of scene time.
     pub secs: f64,
+    /// Parent from node, per node.
+    pub parent_from_node: Vec<Transform>,
     /// World from node, per node.
     pub world_from_node: Vec<Affine3A>,
     /// Linear RGB, per light; see [`crate::Light::intensity`].
     pub light_intensity: Vec<Vec3>,
-}
-
-/// From where and how the scene is looked at.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
-    /// World from camera: looks along −z, +y is up. Rigid (no scale).
-    pub world_from_camera: Affine3A,
-    /// How directions become pixels.
-    pub projection: Projection,
 }
 
 impl Scene {
@@ -30,5 +23,48 @@ impl Scene {
         let mut state = State::default();
         self.update_state(secs, &mut state);
         state
+    }
+
+    /// Bring `state` to the scene at `secs`, reusing its memory: no allocation once it has held this scene.
+    pub fn update_state(&self, secs: f64, state: &mut State) {
+        state.secs = secs;
+        state.parent_from_node.clear();
+        state.parent_from_node.extend(self.nodes.iter().map(|node| node.rest));
+        state.light_intensity.clear();
+        state.light_intensity.extend(self.lights.iter().map(|light| light.intensity));
+        self.apply_animation(secs, state);
+        self.compose_world(state);
+    }
+
+    fn apply_animation(&self, secs: f64, state: &mut State) {
+        if self.animation.duration_secs <= 0.0 {
+            return;
+        }
+        let local_secs = self.animation.local_secs(secs);
+        let nodes = &mut state.parent_from_node;
+        for channel in &self.animation.channels {
+            match (channel.target, channel.value_at(local_secs)) {
+                (Target::Translation(i), Value::Vec3(v)) => nodes[i as usize].translation = v,
+                (Target::Rotation(i), Value::Quat(q)) => nodes[i as usize].rotation = q,
+                (Target::Scale(i), Value::Vec3(v)) => nodes[i as usize].scale = v,
+                (Target::LightIntensity(i), Value::Vec3(v)) => {
+                    state.light_intensity[i as usize] = v;
+                }
+                (target, value) => unreachable!("{target:?} cannot be {value:?}: see Scene::check"),
+            }
+        }
+    }
+
+    /// World from node, in one pass: parents come before their children.
+    fn compose_world(&self, state: &mut State) {
+        state.world_from_node.clear();
+        for (node, transform) in self.nodes.iter().zip(&state.parent_from_node) {
+            let parent_from_node = transform.affine();
+            let world_from_node = match node.parent {
+                Some(parent) => state.world_from_node[parent as usize] * parent_from_node,
+                None => parent_from_node,
+            };
+            state.world_from_node.push(world_from_node);
+        }
     }
 }
