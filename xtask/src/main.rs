@@ -1,2 +1,47 @@
-//! Project chores.
-fn main() {}
+//! Project chores; `cargo xtask help` lists them.
+
+mod command;
+mod missing;
+mod picture;
+mod program;
+mod steps;
+mod test;
+mod window;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+const HELP: &str = "\
+Project chores. Run them from anywhere in the checkout:
+
+  cargo xtask test           everything that CI checks: formatting, clippy, all tests, the program as a
+                             user runs it, a small comparison with its video, and the window
+  cargo xtask smoke-window   only the window: opens it on a virtual screen and looks at a screenshot
+  cargo xtask help           this text
+
+What is missing on this machine is named together with the way to install it, and the checks that need it
+are skipped aloud. With CI=true in the environment a skipped check is a failure.
+
+Exit code: 0 if everything passed, 1 otherwise, 2 for an unknown chore.";
+
+fn main() -> ExitCode {
+    let chore: Vec<String> = std::env::args().skip(1).collect();
+    let passed = match chore.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
+        ["test"] => test::everything(),
+        ["smoke-window"] => test::only_window(),
+        [] | ["help" | "--help" | "-h"] => {
+            println!("{HELP}");
+            true
+        }
+        other => {
+            eprintln!("error: no chore `{}`; see `cargo xtask help`", other.join(" "));
+            return ExitCode::from(2);
+        }
+    };
+    if passed { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// The checkout that this program was built from.
+fn project_dir() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("..")
+}

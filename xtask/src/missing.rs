@@ -1,0 +1,102 @@
+//! What the checks need from the machine, and how one gets it.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// Libraries that the window loads while it runs (none is needed to build), with their Debian packages.
+const WINDOW_LIBRARIES: [(&str, &str); 6] = [
+    ("libX11-xcb.so.1", "libx11-xcb1"),
+    ("libXcursor.so.1", "libxcursor1"),
+    ("libXi.so.6", "libxi6"),
+    ("libXrandr.so.2", "libxrandr2"),
+    ("libxkbcommon-x11.so.0", "libxkbcommon-x11-0"),
+    ("libvulkan.so.1", "libvulkan1"),
+];
+
+/// Something that is not there: what, what for, and how to install it.
+pub(crate) struct Missing {
+    what: &'static str,
+    purpose: &'static str,
+    install: String,
+}
+
+impl std::fmt::Display for Missing {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} is missing ({}); install it with: {}", self.what, self.purpose, self.install)
+    }
+}
+
+/// Needed to build: nothing can be checked without it.
+pub(crate) fn to_build() -> Vec<Missing> {
+    let compilers = ["c++", "g++", "clang++"];
+    let named_compiler = std::env::var_os("CXX").is_some();
+    let mut missing = Vec::new();
+    if !named_compiler && !compilers.iter().any(|compiler| runs(compiler, &["--version"])) {
+        missing.push(debian("a C++ compiler", "the video encoder is built from C++", "g++"));
+    }
+    for (component, args) in
+        [("rustfmt", ["fmt", "--version"]), ("clippy", ["clippy", "--version"])]
+    {
+        let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
+        if !runs(&cargo, &args) {
+            let install = format!("rustup component add {component}");
+            missing.push(Missing { what: component, purpose: "it is one of the checks", install });
+        }
+    }
+    missing
+}
+
+/// Needed to open the window on a virtual screen.
+pub(crate) fn to_open_a_window() -> Vec<Missing> {
+    let mut missing = Vec::new();
+    if !runs("Xvfb", &["-help"]) {
+        missing.push(debian("Xvfb", "the window opens on a virtual screen", "xvfb"));
+    }
+    if !has_vulkan_driver() {
+        let purpose = "the window is drawn in software";
+        missing.push(debian("a Vulkan driver", purpose, "mesa-vulkan-drivers"));
+    }
+    if let Some(known) = known_libraries() {
+        for (library, package) in WINDOW_LIBRARIES {
+            if !known.contains(library) {
+                missing.push(debian(library, "the window loads it", package));
+            }
+        }
+    }
+    missing
+}
+
+/// Needed to look into the comparison's video.
+pub(crate) fn to_read_a_video() -> Vec<Missing> {
+    if runs("ffprobe", &["-version"]) {
+        return Vec::new();
+    }
+    vec![debian("ffprobe", "it reads the comparison's video", "ffmpeg")]
+}
+
+fn debian(what: &'static str, purpose: &'static str, package: &str) -> Missing {
+    Missing { what, purpose, install: format!("apt-get install {package}") }
+}
+
+/// Whether the program starts; what it answers does not matter, except that cargo says no to an unknown
+/// subcommand and Xvfb's help ends with an error code.
+fn runs(program: &str, args: &[&str]) -> bool {
+    let status =
+        Command::new(program).args(args).stdout(Stdio::null()).stderr(Stdio::null()).status();
+    status.is_ok_and(|status| status.success() || program == "Xvfb")
+}
+
+fn has_vulkan_driver() -> bool {
+    ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d"]
+        .iter()
+        .filter_map(|folder| Path::new(folder).read_dir().ok())
+        .any(|mut files| files.next().is_some())
+}
+
+/// The dynamic linker's list; `None` on systems without one, where the window step itself will tell.
+fn known_libraries() -> Option<String> {
+    let list = ["ldconfig", "/sbin/ldconfig"]
+        .iter()
+        .find_map(|program| Command::new(program).arg("-p").output().ok())?;
+    Some(String::from_utf8_lossy(&list.stdout).into_owned())
+}
