@@ -1,9 +1,9 @@
-//! The samples kept: one per pixel.
+//! The samples kept: the newest of every pixel.
 
 use crate::{Size, Time};
 
-/// The newest sample of every pixel.
-#[derive(Clone, Debug)]
+/// The newest sample of every pixel: its linear colour and its time.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Canvas {
     size: Size,
     rgb: Vec<[f32; 3]>,
@@ -14,6 +14,15 @@ impl Canvas {
     /// A black canvas on which no pixel has been traced yet (all times [`Time::ZERO`]).
     pub fn new(size: Size) -> Canvas {
         Canvas { size, rgb: vec![[0.0; 3]; size.pixels()], time: vec![Time::ZERO; size.pixels()] }
+    }
+
+    /// A canvas that starts with a whole picture traced at [`Time::ZERO`].
+    ///
+    /// # Panics
+    /// If `rgb` (linear, row-major) does not have one colour per pixel.
+    pub fn from_picture(size: Size, rgb: Vec<[f32; 3]>) -> Canvas {
+        assert_eq!(rgb.len(), size.pixels(), "one colour per pixel");
+        Canvas { size, rgb, time: vec![Time::ZERO; size.pixels()] }
     }
 
     /// Width and height.
@@ -29,5 +38,62 @@ impl Canvas {
     /// When each pixel was traced last, row-major; [`Time::ZERO`]: never.
     pub fn time(&self) -> &[Time] {
         &self.time
+    }
+
+    /// Write a sample; returns the time and colour that it replaces.
+    #[inline]
+    pub(crate) fn replace(&mut self, pixel: u32, time: Time, rgb: [f32; 3]) -> (Time, [f32; 3]) {
+        let i = pixel as usize;
+        (std::mem::replace(&mut self.time[i], time), std::mem::replace(&mut self.rgb[i], rgb))
+    }
+
+    /// The same picture in another size: every pixel takes the sample nearest to its centre, age included.
+    pub fn resized(&self, size: Size) -> Canvas {
+        let nearest = |i: u32, to: u32, from: u32| {
+            // Centre of pixel i of `to`, in pixels of `from`, without rounding error.
+            ((2 * u64::from(i) + 1) * u64::from(from) / (2 * u64::from(to))) as u32
+        };
+        let source: Vec<usize> = (0..size.pixels() as u32)
+            .map(|pixel| {
+                let (x, y) = size.xy(pixel);
+                let from_x = nearest(x, size.width, self.size.width);
+                let from_y = nearest(y, size.height, self.size.height);
+                self.size.index(from_x, from_y) as usize
+            })
+            .collect();
+        Canvas {
+            size,
+            rgb: source.iter().map(|&i| self.rgb[i]).collect(),
+            time: source.iter().map(|&i| self.time[i]).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbered(width: u32, height: u32) -> Canvas {
+        let size = Size::new(width, height);
+        Canvas::from_picture(size, (0..size.pixels()).map(|i| [i as f32; 3]).collect())
+    }
+
+    #[test]
+    fn resizing_there_and_back_keeps_the_picture() {
+        let canvas = numbered(7, 5);
+        assert_eq!(canvas.resized(Size::new(21, 15)).resized(Size::new(7, 5)), canvas);
+        assert_eq!(canvas.resized(canvas.size()), canvas);
+    }
+
+    #[test]
+    fn resizing_to_one_pixel_takes_the_middle() {
+        assert_eq!(numbered(3, 3).resized(Size::new(1, 1)).rgb(), [[4.0; 3]]);
+    }
+
+    #[test]
+    fn replacing_returns_what_was_there() {
+        let mut canvas = numbered(2, 1);
+        assert_eq!(canvas.replace(1, Time(5), [9.0; 3]), (Time::ZERO, [1.0; 3]));
+        assert_eq!(canvas.replace(1, Time(6), [0.0; 3]), (Time(5), [9.0; 3]));
     }
 }

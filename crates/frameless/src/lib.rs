@@ -1,3 +1,57 @@
-//! Frameless rendering.
-mod rng; mod sample; mod sampler; mod time; mod tracer; mod canvas;
-pub use canvas::Canvas; pub use rng::Rng; pub use sample::*; pub use sampler::*; pub use time::Time; pub use tracer::*;
+//! Frameless rendering: choose a pixel, trace it *now*, show it at once, and learn from what changed.
+//!
+//! The actors: a [`Tracer`] is a renderer; a [`Sampler`] chooses which pixels it traces next; the [`Canvas`] keeps the
+//! newest sample of every pixel; the [`Engine`] is the loop between them, on a [`Clock`] that is real or simulated.
+//! A reconstruction ([`hold`]) makes a picture of the canvas at any time.
+//!
+//! ```
+//! use frameless::{Batch, Clock, Engine, Function, SamplerKind, Size, Time};
+//!
+//! // A renderer: any function from pixels and a time to linear RGB.
+//! let render = |batch: &Batch| -> Vec<[f32; 3]> {
+//!     let brightness = (batch.scene_secs as f32).sin().abs();
+//!     batch.requests.iter().map(|_| [brightness; 3]).collect()
+//! };
+//! let sampler = SamplerKind::CHANGE.build(1);
+//! let mut engine =
+//!     Engine::new(Size::new(64, 48), Clock::simulated(100_000.0), sampler, Function::new(render));
+//! engine.run_until(Time::from_secs(0.5))?;
+//! let rgba8: Vec<[u8; 4]> = frameless::hold(engine.canvas(), engine.display());
+//! assert_eq!(rgba8.len(), 64 * 48);
+//! # Ok::<(), frameless::EngineError>(())
+//! ```
+
+mod canvas;
+mod clock;
+mod display;
+mod engine;
+mod hold;
+mod rng;
+mod sample;
+mod sampler;
+mod samplers;
+mod tile;
+mod tile_pdf;
+mod time;
+mod timeline;
+mod tracer;
+
+pub use time::Time;
+
+pub use sample::{Answer, Batch, Request, Size, Surface};
+
+pub use sampler::{Insight, Observation, Sampler};
+pub use samplers::{Change, DEFAULT_TILE, DEFAULT_W_D, Permutation, Random, SamplerKind};
+
+pub use tracer::{Function, Tracer};
+
+pub use canvas::Canvas;
+
+pub use clock::{BATCHES_PER_SEC, Clock, Real, Simulated};
+pub use engine::{Counters, Engine, EngineError};
+pub use timeline::Timeline;
+
+pub use display::Display;
+pub use hold::{hold, hold_into};
+
+pub use rng::Rng;

@@ -15,7 +15,10 @@ impl Size {
     /// # Panics
     /// If a side is zero, or if the picture has 2³² or more pixels.
     pub fn new(width: u32, height: u32) -> Size {
-        assert!(width > 0 && height > 0, "a picture needs at least one pixel, got {width}×{height}");
+        assert!(
+            width > 0 && height > 0,
+            "a picture needs at least one pixel, got {width}×{height}"
+        );
         assert!(width.checked_mul(height).is_some(), "{width}×{height} is more than 2³² pixels");
         Size { width, height }
     }

@@ -1,0 +1,304 @@
+//! THE LOOP: choose pixels → trace them now → keep the samples → observe what changed.
+
+use thiserror::Error;
+
+use crate::{
+    Answer, Batch, Canvas, Clock, Display, Observation, Request, Sampler, Size, Time, Timeline,
+    Tracer,
+};
+
+/// Everything that runs a frameless picture: a clock, a sampler, a renderer, and the canvas between them.
+pub struct Engine<T> {
+    clock: Clock,
+    timeline: Timeline,
+    display: Display,
+    canvas: Canvas,
+    sampler: Box<dyn Sampler>,
+    tracer: T,
+    // Samples submitted and not yet answered.
+    outstanding: usize,
+    counters: Counters,
+    // Reused from batch to batch.
+    spare_requests: Vec<Request>,
+    observations: Vec<Observation>,
+}
+
+/// What the loop has done so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Batches chosen.
+    pub batches: u64,
+    /// Samples written to the canvas.
+    pub kept: u64,
+    /// Samples that came too late: the pixel had a newer one, or the picture another size.
+    pub dropped: u64,
+}
+
+/// A renderer's answer that cannot be used.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum EngineError {
+    /// A colour that is NaN or infinite.
+    #[error(
+        "the renderer returned a colour that is not finite, {rgb:?}, for pixel ({x}, {y}) at scene time {scene_secs} s"
+    )]
+    NotFinite {
+        /// Column.
+        x: u32,
+        /// Row.
+        y: u32,
+        /// Scene time in seconds.
+        scene_secs: f64,
+        /// The colour.
+        rgb: [f32; 3],
+    },
+    /// Arrays of the wrong length.
+    #[error(
+        "the renderer answered {requests} requests with {colours} colours and {surfaces} surfaces \
+         (wanted: as many colours, and as many surfaces or none)"
+    )]
+    WrongLength {
+        /// Requests in the answer.
+        requests: usize,
+        /// Colours in the answer.
+        colours: usize,
+        /// Surfaces in the answer.
+        surfaces: usize,
+    },
+    /// A pixel that is not on the canvas.
+    #[error("the renderer answered for pixel number {pixel}, but {width}×{height} has none such")]
+    NoSuchPixel {
+        /// The index in the answer.
+        pixel: u32,
+        /// The canvas's width.
+        width: u32,
+        /// The canvas's height.
+        height: u32,
+    },
+}
+
+/// Batches under way at once on the real clock: while one is traced the next is chosen.
+const PIPELINE_DEPTH: usize = 2;
+
+impl<T: Tracer> Engine<T> {
+    /// A loop over a black canvas.
+    pub fn new(size: Size, clock: Clock, sampler: Box<dyn Sampler>, tracer: T) -> Engine<T> {
+        Engine::with_canvas(Canvas::new(size), clock, sampler, tracer)
+    }
+
+    /// A loop that goes on with an existing picture.
+    pub fn with_canvas(
+        canvas: Canvas,
+        clock: Clock,
+        sampler: Box<dyn Sampler>,
+        tracer: T,
+    ) -> Engine<T> {
+        Engine {
+            clock,
+            timeline: Timeline::default(),
+            display: Display::default(),
+            canvas,
+            sampler,
+            tracer,
+            outstanding: 0,
+            counters: Counters::default(),
+            spare_requests: Vec::new(),
+            observations: Vec::new(),
+        }
+    }
+
+    /// One turn of the loop, about 1 ms. Returns how many samples were kept.
+    ///
+    /// On the simulated clock: one batch, chosen, traced, kept and observed. On the real clock: batches are
+    /// chosen until the renderer has enough to do, then one answer is awaited.
+    ///
+    /// # Errors
+    /// If the renderer's answer cannot be used. Its good samples before the bad one are kept, and the loop can
+    /// go on.
+    pub fn step(&mut self) -> Result<usize, EngineError> {
+        match &mut self.clock {
+            Clock::Simulated(clock) => {
+                let (now, count) = clock.next_batch();
+                self.choose_and_submit(now, count);
+                self.collect_all()
+            }
+            Clock::Real(_) => self.step_real(),
+        }
+    }
+
+    /// Simulated clock: run every batch that begins before `end`.
+    ///
+    /// # Errors
+    /// As [`Engine::step`].
+    pub fn run_until(&mut self, end: Time) -> Result<(), EngineError> {
+        while self.clock.now() < end {
+            self.step()?;
+        }
+        Ok(())
+    }
+
+    fn step_real(&mut self) -> Result<usize, EngineError> {
+        while let Clock::Real(clock) = &mut self.clock {
+            if self.outstanding >= PIPELINE_DEPTH * clock.batch_length() {
+                break;
+            }
+            let (now, count) = clock.next_batch();
+            if count == 0 {
+                break;
+            }
+            self.choose_and_submit(now, count);
+        }
+        if self.outstanding == 0 {
+            self.clock.rest();
+            return Ok(0);
+        }
+        let kept = self.collect_one()?.unwrap_or(0);
+        self.clock.answered(kept, self.outstanding > 0);
+        Ok(kept)
+    }
+
+    fn choose_and_submit(&mut self, now: Time, count: usize) {
+        let mut requests = std::mem::take(&mut self.spare_requests);
+        requests.clear();
+        self.sampler.choose(now, &self.canvas, count, &mut requests);
+        self.outstanding += requests.len();
+        self.tracer.submit(Batch {
+            id: self.counters.batches,
+            now,
+            scene_secs: self.timeline.scene_secs(now),
+            size: self.canvas.size(),
+            requests,
+        });
+        self.counters.batches += 1;
+    }
+
+    fn collect_all(&mut self) -> Result<usize, EngineError> {
+        let mut total = 0;
+        while self.outstanding > 0 {
+            match self.collect_one()? {
+                Some(kept) => total += kept,
+                None => break,
+            }
+        }
+        Ok(total)
+    }
+
+    /// Waits for an answer, keeps and observes it. `None`: the renderer has lost what was under way.
+    fn collect_one(&mut self) -> Result<Option<usize>, EngineError> {
+        let Some(answer) = self.tracer.collect(true) else {
+            self.outstanding = 0;
+            return Ok(None);
+        };
+        self.outstanding = self.outstanding.saturating_sub(answer.requests.len());
+        let outcome = self.keep(&answer);
+        self.sampler.observe(&self.observations);
+        self.counters.kept += self.observations.len() as u64;
+        self.spare_requests = answer.requests;
+        outcome.map(|()| Some(self.observations.len()))
+    }
+
+    /// Writes an answer to the canvas and notes what each sample changed.
+    fn keep(&mut self, answer: &Answer) -> Result<(), EngineError> {
+        self.observations.clear();
+        let (requests, colours) = (answer.requests.len(), answer.rgb.len());
+        let surfaces = answer.surfaces.len();
+        if colours != requests || (surfaces != requests && surfaces != 0) {
+            return Err(EngineError::WrongLength { requests, colours, surfaces });
+        }
+        let size = self.canvas.size();
+        if answer.size != size {
+            self.counters.dropped += requests as u64;
+            return Ok(());
+        }
+        for (request, &rgb) in answer.requests.iter().zip(&answer.rgb) {
+            let pixel = request.pixel;
+            if pixel as usize >= size.pixels() {
+                let Size { width, height } = size;
+                return Err(EngineError::NoSuchPixel { pixel, width, height });
+            }
+            if !rgb.iter().all(|c| c.is_finite()) {
+                let (x, y) = size.xy(pixel);
+                return Err(EngineError::NotFinite { x, y, scene_secs: answer.scene_secs, rgb });
+            }
+            if answer.now < self.canvas.time()[pixel as usize] {
+                self.counters.dropped += 1;
+                continue;
+            }
+            let (previous, old) = self.canvas.replace(pixel, answer.now, rgb);
+            let change = self.display.change(rgb, old);
+            self.observations.push(Observation { pixel, now: answer.now, previous, change });
+        }
+        Ok(())
+    }
+
+    /// The present time of the engine's clock.
+    pub fn now(&self) -> Time {
+        self.clock.now()
+    }
+
+    /// The samples kept so far.
+    pub fn canvas(&self) -> &Canvas {
+        &self.canvas
+    }
+
+    /// What the loop has done so far.
+    pub fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// Who chooses the pixels.
+    pub fn sampler(&self) -> &dyn Sampler {
+        &*self.sampler
+    }
+
+    /// Let somebody else choose the pixels; the picture stays.
+    pub fn set_sampler(&mut self, sampler: Box<dyn Sampler>) {
+        self.sampler = sampler;
+    }
+
+    /// The renderer.
+    pub fn tracer(&self) -> &T {
+        &self.tracer
+    }
+
+    /// The renderer, to change its camera or its scene; batches under way are answered with what they were
+    /// submitted with.
+    pub fn tracer_mut(&mut self) -> &mut T {
+        &mut self.tracer
+    }
+
+    /// Exposure and transfer function.
+    pub fn display(&self) -> &Display {
+        &self.display
+    }
+
+    /// Change how radiance is shown. The samples stay as they are; changes are measured with the new display
+    /// from the next sample on.
+    pub fn set_display(&mut self, display: Display) {
+        self.display = display;
+    }
+
+    /// Which moment of the scene is shown.
+    pub fn timeline(&self) -> &Timeline {
+        &self.timeline
+    }
+
+    /// Play, pause, scrub.
+    pub fn timeline_mut(&mut self) -> &mut Timeline {
+        &mut self.timeline
+    }
+
+    /// Real clock: at most this many samples per second; `None`: as many as the renderer can. The simulated
+    /// clock has its rate already and ignores this.
+    pub fn set_budget(&mut self, samples_per_sec: Option<f64>) {
+        if let Clock::Real(clock) = &mut self.clock {
+            clock.set_budget(samples_per_sec);
+        }
+    }
+
+    /// Go on in another size with the same picture, resampled. Batches under way are dropped when they come.
+    pub fn resize(&mut self, size: Size) {
+        if size != self.canvas.size() {
+            self.canvas = self.canvas.resized(size);
+        }
+    }
+}

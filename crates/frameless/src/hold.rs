@@ -1,0 +1,16 @@
+//! Reconstruction `hold`: every pixel shows its newest sample until the next one.
+
+use crate::{Canvas, Display};
+
+/// The picture now: sRGB-encoded RGBA, row-major from the top, alpha 255.
+pub fn hold(canvas: &Canvas, display: &Display) -> Vec<[u8; 4]> {
+    let mut rgba8 = Vec::new();
+    hold_into(canvas, display, &mut rgba8);
+    rgba8
+}
+
+/// As [`hold`], into memory that is there already.
+pub fn hold_into(canvas: &Canvas, display: &Display, rgba8: &mut Vec<[u8; 4]>) {
+    rgba8.clear();
+    rgba8.extend(canvas.rgb().iter().map(|&rgb| display.encode_rgba8(rgb)));
+}
