@@ -1,11 +1,17 @@
 //! Drawing from a probability per tile: first a tile, then a pixel inside it.
 //!
-//! With P(T) the probability of tile T, and b(x, y) the bilinear interpolation of the P around (x, y), where the tiles' centres are
-//! the knots and the border tiles' values go on outwards:
+//! With P(T) the probability of tile T, and b(x, y) the bilinear interpolation of the P around (x, y), where the
+//! tiles' centres are the knots and the border tiles' values go on outwards:
 //!
-//!     P(p) = P(T) · b(p) / Σ_{q∈T} b(q),   p ∈ T
+//! ```text
+//! P(p) = P(T) · b(p) / Σ_{q∈T} b(q),   p ∈ T
+//! ```
 //!
 //! (Dayal, Watson and Luebke 2002; b is evaluated at pixel centres.)
+//!
+//! Differs from the paper: what is interpolated is P(T) / n_T, the probability per pixel, with n_T the number of the
+//! tile's pixels. For whole tiles that is the same. At the border, where tiles may be cut, it keeps
+//! an even distribution even; interpolating P(T) would halve the density beside a cut tile.
 
 use crate::tile::TileGrid;
 use crate::{Request, Rng};
@@ -14,7 +20,8 @@ use crate::{Request, Rng};
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TilePdf {
     pub(crate) probability: Vec<f32>,
-    // Reused from draw to draw.
+    // Reused from draw to draw; `density` is P(T) / n_T.
+    density: Vec<f32>,
     spacings: Vec<f64>,
 }
 
@@ -33,6 +40,8 @@ impl TilePdf {
         count: usize,
         requests: &mut Vec<Request>,
     ) {
+        self.density.clear();
+        self.density.extend(densities(grid, &self.probability));
         let total_spacing = self.draw_spacings(rng, count);
         let total: f64 = self.probability.iter().map(|&p| f64::from(p)).sum();
         let scale = total / total_spacing;
@@ -47,7 +56,7 @@ impl TilePdf {
                 pixels = None;
             }
             let inside =
-                pixels.get_or_insert_with(|| Interpolation::new(grid, &self.probability, tile));
+                pixels.get_or_insert_with(|| Interpolation::new(grid, &self.density, tile));
             requests.push(Request::centre(inside.draw(grid, rng)));
         }
     }
@@ -66,9 +75,10 @@ impl TilePdf {
     /// P(p) for every pixel, by the definition above: the density of [`TilePdf::draw`].
     pub(crate) fn pixel_probability(&self, grid: &TileGrid) -> Vec<f32> {
         let mut probability = vec![0.0; grid.size.pixels()];
+        let density: Vec<f32> = densities(grid, &self.probability).collect();
         for tile in 0..grid.len() {
             let rect = grid.rect(tile);
-            let inside = Interpolation::new(grid, &self.probability, tile);
+            let inside = Interpolation::new(grid, &density, tile);
             let pixels =
                 || (rect.y0..rect.y1).flat_map(|y| (rect.x0..rect.x1).map(move |x| (x, y)));
             let sum: f64 = pixels().map(|(x, y)| f64::from(inside.value(x, y))).sum();
@@ -82,6 +92,12 @@ impl TilePdf {
     }
 }
 
+/// P(T) / n_T of every tile.
+fn densities(grid: &TileGrid, probability: &[f32]) -> impl Iterator<Item = f32> {
+    let density = |(tile, &p): (usize, &f32)| p / grid.rect(tile).pixels() as f32;
+    probability.iter().enumerate().map(density)
+}
+
 /// −ln u with u uniform in (0, 1]: exponentially distributed with mean 1.
 fn exponential(rng: &mut Rng) -> f64 {
     -f64::from((1.0 - rng.unit_f32()).ln())
@@ -92,13 +108,13 @@ struct Interpolation {
     rect: crate::tile::TileRect,
     centre: [f32; 2],
     inverse_side: f32,
-    // P of the 3×3 tiles around, clamped at the border; [row][column].
+    // P(T) / n_T of the 3×3 tiles around, clamped at the border; [row][column].
     knots: [[f32; 3]; 3],
     largest: f32,
 }
 
 impl Interpolation {
-    fn new(grid: &TileGrid, probability: &[f32], tile: usize) -> Interpolation {
+    fn new(grid: &TileGrid, density: &[f32], tile: usize) -> Interpolation {
         let rect = grid.rect(tile);
         let (column, row) = (tile as u32 % grid.columns, tile as u32 / grid.columns);
         // 0, 1, 2 for the tile before, the tile itself, the tile after; clamped.
@@ -107,7 +123,7 @@ impl Interpolation {
         let knots: [[f32; 3]; 3] = std::array::from_fn(|j| {
             std::array::from_fn(|i| {
                 let (column, row) = (near(column, i, grid.columns), near(row, j, grid.rows));
-                probability[(row * grid.columns + column) as usize]
+                density[(row * grid.columns + column) as usize]
             })
         });
         let half = 0.5 * grid.side as f32;
@@ -211,9 +227,9 @@ mod tests {
             for column in -1..=i64::from(grid.columns) {
                 let clamped_row = row.clamp(0, i64::from(grid.rows) - 1);
                 let clamped_column = column.clamp(0, i64::from(grid.columns) - 1);
-                let p =
-                    probability[(clamped_row * i64::from(grid.columns) + clamped_column) as usize];
-                sum += f64::from(p) * hat(u - column as f64) * hat(v - row as f64);
+                let knot = (clamped_row * i64::from(grid.columns) + clamped_column) as usize;
+                let per_pixel = f64::from(probability[knot]) / f64::from(grid.rect(knot).pixels());
+                sum += per_pixel * hat(u - column as f64) * hat(v - row as f64);
             }
         }
         sum

@@ -13,7 +13,7 @@ fn still(batch: &Batch) -> Vec<[f32; 3]> {
 
 /// The left half is still, the right half flickers for ever.
 fn half_flickering(batch: &Batch) -> Vec<[f32; 3]> {
-    let bright = (batch.scene_secs * 100.0) as u64 % 2 == 0;
+    let bright = ((batch.scene_secs * 100.0) as u64).is_multiple_of(2);
     let colour = |r: &Request| {
         let right = batch.size.xy(r.pixel).0 >= batch.size.width / 2;
         [if right && bright { 1.0 } else { 0.0 }; 3]
@@ -179,7 +179,7 @@ struct Unreliable {
 impl Tracer for Unreliable {
     fn submit(&mut self, batch: Batch) {
         self.seen += 1;
-        if self.seen % 3 != 0 {
+        if !self.seen.is_multiple_of(3) {
             self.waiting.push(batch);
         }
     }

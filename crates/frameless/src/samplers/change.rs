@@ -2,10 +2,12 @@
 //!
 //! For pixel p of n, with newₖ and oldₖ its last two colours in display-referred sRGB and t_p its last time:
 //!
-//!     d_p  = Σₖ (newₖ − oldₖ)²                       change, set whenever p is traced
-//!     a_p  = t − t_p                                 age
-//!     P(p) = w_d · d_p / Σd + w_a · a_p / Σa,        w_d + w_a = 1
-//!     P(T) = Σ_{p∈T} P(p)                            over square tiles
+//! ```text
+//! d_p  = Σₖ (newₖ − oldₖ)²                       change, set whenever p is traced
+//! a_p  = t − t_p                                 age
+//! P(p) = w_d · d_p / Σd + w_a · a_p / Σa,        w_d + w_a = 1
+//! P(T) = Σ_{p∈T} P(p)                            over square tiles
+//! ```
 //!
 //! A tile is drawn by P(T), then a pixel inside it by the bilinear interpolation of the tile probabilities
 //! ([`crate::tile_pdf`]).
