@@ -1,0 +1,164 @@
+//! What every scene promises, said as code: for tests, and for scenes put together by hand.
+
+use glam::Vec3;
+
+use crate::{Channel, Geometry, Interpolation, Mesh, Projection, Scene, Target, Values};
+
+/// How far from 1 the length of a unit vector or quaternion may be: a few roundings.
+const UNIT_TOLERANCE: f32 = 1e-3;
+
+impl Scene {
+    /// Whether the scene keeps every promise of its documentation: indices in bounds, numbers finite, parents
+    /// first. The error names the first that is broken. Looks at everything: not for every sample.
+    pub fn check(&self) -> Result<(), String> {
+        self.check_surfaces()?;
+        self.check_nodes()?;
+        for (i, geometry) in self.geometries.iter().enumerate() {
+            self.check_geometry(geometry).map_err(|why| format!("geometry {i}: {why}"))?;
+        }
+        self.check_cameras_and_lights()?;
+        wanted(
+            self.animation.duration_secs.is_finite() && self.animation.duration_secs >= 0.0,
+            "a finite animation length of at least 0",
+        )?;
+        for (i, channel) in self.animation.channels.iter().enumerate() {
+            self.check_channel(channel).map_err(|why| format!("channel {i}: {why}"))?;
+        }
+        let mut targets = std::collections::HashSet::new();
+        let once = self.animation.channels.iter().all(|channel| targets.insert(channel.target));
+        wanted(once, "each property of each node driven at most once")
+    }
+
+    fn check_surfaces(&self) -> Result<(), String> {
+        for (i, image) in self.images.iter().enumerate() {
+            let texels = image.width as usize * image.height as usize;
+            wanted(
+                texels > 0 && texels == image.rgba.len(),
+                &format!("image {i}: all its texels"),
+            )?;
+        }
+        for (i, texture) in self.textures.iter().enumerate() {
+            wanted(within(texture.image, &self.images), &format!("texture {i}: an image"))?;
+        }
+        for (i, material) in self.materials.iter().enumerate() {
+            let texture = material.base_color_texture;
+            let found = texture.is_none_or(|t| within(t.texture, &self.textures) && t.uv_set < 2);
+            wanted(found, &format!("material {i}: a texture"))?;
+            let numbers = material.base_color.is_finite()
+                && material.emissive.is_finite()
+                && (0.0..=1.0).contains(&material.metallic)
+                && (0.0..=1.0).contains(&material.roughness);
+            wanted(numbers, &format!("material {i}: finite colours, factors in [0, 1]"))?;
+        }
+        Ok(())
+    }
+
+    fn check_nodes(&self) -> Result<(), String> {
+        for (i, node) in self.nodes.iter().enumerate() {
+            let parent_first = node.parent.is_none_or(|parent| (parent as usize) < i);
+            wanted(parent_first, &format!("node {i}: a parent before it"))?;
+            let rest = node.rest;
+            let finite = rest.translation.is_finite() && rest.scale.is_finite();
+            wanted(finite && is_unit(rest.rotation.length()), &format!("node {i}: a transform"))?;
+        }
+        for (i, instance) in self.instances.iter().enumerate() {
+            let found =
+                within(instance.node, &self.nodes) && within(instance.geometry, &self.geometries);
+            wanted(found, &format!("instance {i}: a node and a geometry"))?;
+        }
+        Ok(())
+    }
+
+    fn check_geometry(&self, geometry: &Geometry) -> Result<(), String> {
+        match geometry {
+            Geometry::Sphere { material } => {
+                wanted(within(*material, &self.materials), "a material")
+            }
+            Geometry::Mesh(mesh) => check_mesh(mesh, self.materials.len()),
+        }
+    }
+
+    fn check_cameras_and_lights(&self) -> Result<(), String> {
+        wanted(!self.cameras.is_empty(), "a camera")?;
+        for (i, camera) in self.cameras.iter().enumerate() {
+            let sane = match camera.projection {
+                Projection::Perspective { yfov_rad } => {
+                    yfov_rad > 0.0 && yfov_rad < std::f32::consts::PI
+                }
+                Projection::Orthographic { ymag } => ymag > 0.0 && ymag.is_finite(),
+            };
+            wanted(
+                sane && within(camera.node, &self.nodes),
+                &format!("camera {i}: a node, an angle"),
+            )?;
+        }
+        wanted(!self.lights.is_empty() || self.ambient != Vec3::ZERO, "some light")?;
+        let backdrop = [self.ambient, self.sky[0], self.sky[1]];
+        wanted(backdrop.iter().all(|c| c.is_finite()), "finite ambient and sky")?;
+        for (i, light) in self.lights.iter().enumerate() {
+            let sane = light.intensity.is_finite() && light.range > 0.0;
+            wanted(
+                sane && within(light.node, &self.nodes),
+                &format!("light {i}: a node, a strength"),
+            )?;
+        }
+        Ok(())
+    }
+
+    fn check_channel(&self, channel: &Channel) -> Result<(), String> {
+        let (found, rotation) = match channel.target {
+            Target::Translation(i) | Target::Scale(i) => (within(i, &self.nodes), false),
+            Target::Rotation(i) => (within(i, &self.nodes), true),
+            Target::LightIntensity(i) => (within(i, &self.lights), false),
+        };
+        wanted(found, "a target")?;
+        let times = &channel.times;
+        let ordered = times.windows(2).all(|pair| pair[0] < pair[1]);
+        let finite = times.iter().all(|time| time.is_finite() && *time >= 0.0);
+        wanted(!times.is_empty() && ordered && finite, "strictly increasing key times from 0 on")?;
+        let spline = channel.interpolation == Interpolation::CubicSpline;
+        let values_per_key = if spline { 3 } else { 1 };
+        let (count, finite) = match &channel.values {
+            Values::Vec3(values) => (values.len(), values.iter().all(|v| v.is_finite())),
+            Values::Quat(values) => (values.len(), values.iter().all(|q| q.is_finite())),
+        };
+        wanted(count == times.len() * values_per_key && finite, "a finite value for each key")?;
+        wanted(
+            rotation == matches!(channel.values, Values::Quat(_)),
+            "values of the target's kind",
+        )?;
+        let Values::Quat(values) = &channel.values else { return Ok(()) };
+        let keys = values.iter().skip(usize::from(spline)).step_by(values_per_key);
+        wanted(keys.into_iter().all(|q| is_unit(q.length())), "unit quaternions")
+    }
+}
+
+fn check_mesh(mesh: &Mesh, materials: usize) -> Result<(), String> {
+    let vertices = mesh.positions.len();
+    wanted(mesh.positions.iter().all(|p| p.is_finite()), "finite positions")?;
+    wanted(mesh.normals.iter().all(|n| is_unit(n.length())), "unit normals")?;
+    let uvs = mesh.uvs.iter().flatten();
+    wanted(uvs.into_iter().all(|uv| uv.is_finite()), "finite texture coordinates")?;
+    wanted(mesh.colors.iter().all(|color| color.is_finite()), "finite colours")?;
+    let lengths = [mesh.normals.len(), mesh.uvs[0].len(), mesh.uvs[1].len(), mesh.colors.len()];
+    wanted(lengths.iter().all(|&n| n == 0 || n == vertices), "as many attributes as positions")?;
+    let in_bounds = mesh.triangles.iter().flatten().all(|&v| (v as usize) < vertices);
+    wanted(in_bounds, "triangles of existing vertices")?;
+    let known = mesh.triangle_materials.iter().all(|&m| (m as usize) < materials);
+    wanted(
+        known && mesh.triangle_materials.len() == mesh.triangles.len(),
+        "a material per triangle",
+    )
+}
+
+fn within<T>(index: u32, of: &[T]) -> bool {
+    (index as usize) < of.len()
+}
+
+fn is_unit(length: f32) -> bool {
+    (length - 1.0).abs() <= UNIT_TOLERANCE
+}
+
+fn wanted(holds: bool, what: &str) -> Result<(), String> {
+    if holds { Ok(()) } else { Err(format!("wanted {what}")) }
+}
