@@ -1,0 +1,170 @@
+//! What a primitive's vertices carry: read from accessors, with every number made finite.
+
+use glam::{Vec2, Vec3, Vec4};
+
+use super::accessor::Accessor;
+use super::error::{Fault, quoted};
+use super::json::Json;
+use super::limits::Budget;
+use super::warnings::Warnings;
+
+/// Beyond this a position counts as infinite: squares of distances up to it are finite in 32 bits.
+const LARGEST_COORDINATE: f32 = 1e18;
+
+/// Accessors of the attributes that are read. Primitives with equal ones share their vertices.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct Attributes {
+    pub(super) position: Option<usize>,
+    pub(super) normal: Option<usize>,
+    pub(super) uvs: [Option<usize>; 2],
+    pub(super) color: Option<usize>,
+}
+
+impl Attributes {
+    pub(super) fn parse(
+        primitive: &Json<'_>,
+        accessors: &[Accessor<'_>],
+        warnings: &mut Warnings,
+    ) -> Result<Attributes, Fault> {
+        let mut attributes = Attributes::default();
+        let list = primitive.required("attributes")?.members()?;
+        for (semantic, json) in &list {
+            let accessor = json.index(accessors.len(), "accessors")?;
+            match *semantic {
+                "POSITION" => attributes.position = Some(accessor),
+                "NORMAL" => attributes.normal = Some(accessor),
+                "TEXCOORD_0" => attributes.uvs[0] = Some(accessor),
+                "TEXCOORD_1" => attributes.uvs[1] = Some(accessor),
+                "COLOR_0" => attributes.color = Some(accessor),
+                other if is_silently_ignored(other) => {}
+                other => warnings.about("vertex attributes ignored", quoted(other)),
+            }
+        }
+        if let Some(position) = attributes.position {
+            refuse_other_counts(&list, accessors, accessors[position].count)?;
+        }
+        Ok(attributes)
+    }
+}
+
+/// Tangents say nothing without normal maps, joints and weights nothing without skins, both of which are warned about where
+/// they are used; names that begin with an underscore belong to applications.
+fn is_silently_ignored(semantic: &str) -> bool {
+    let numbered = ["JOINTS_", "WEIGHTS_"].iter().any(|prefix| semantic.starts_with(prefix));
+    numbered || semantic == "TANGENT" || semantic.starts_with('_')
+}
+
+fn refuse_other_counts(
+    attributes: &[(&str, Json<'_>)],
+    accessors: &[Accessor<'_>],
+    count: usize,
+) -> Result<(), Fault> {
+    for (_, json) in attributes {
+        let came = accessors[json.index(accessors.len(), "accessors")?].count;
+        if came != count {
+            let wanted = format!("as many elements as POSITION has: {count}");
+            return Err(Fault::at(json.pointer(), wanted, came));
+        }
+    }
+    Ok(())
+}
+
+/// Vertices with what they carry; arrays are as long as `positions`.
+#[derive(Debug, Default)]
+pub(super) struct Vertices {
+    /// Finite.
+    pub(super) positions: Vec<Vec3>,
+    /// As in the file: may be of any length, or NaN.
+    pub(super) normals: Option<Vec<Vec3>>,
+    pub(super) uvs: [Option<Vec<Vec2>>; 2],
+    pub(super) colors: Option<Vec<Vec4>>,
+    /// Vertices whose position was infinite or NaN (and is 0 now), ascending.
+    pub(super) nowhere: Vec<u32>,
+}
+
+impl Vertices {
+    /// Reads what `attributes` names; `mesh` is for warnings.
+    pub(super) fn read(
+        attributes: &Attributes,
+        accessors: &[Accessor<'_>],
+        mesh: &Json<'_>,
+        budget: &mut Budget,
+        warnings: &mut Warnings,
+    ) -> Result<Vertices, Fault> {
+        let mut vertices = Vertices::default();
+        if let Some(accessor) = attributes.position {
+            budget.add_vertices(mesh.pointer(), accessors[accessor].count)?;
+            vertices.positions = vectors(accessors[accessor].numbers::<3>(budget)?);
+            vertices.settle_positions(mesh, warnings);
+        }
+        if let Some(accessor) = attributes.normal {
+            vertices.normals = Some(vectors(accessors[accessor].numbers::<3>(budget)?));
+        }
+        for (uvs, accessor) in vertices.uvs.iter_mut().zip(attributes.uvs) {
+            let Some(accessor) = accessor else { continue };
+            let mut read: Vec<Vec2> = vectors(accessors[accessor].numbers::<2>(budget)?);
+            settle(
+                &mut read,
+                |uv| uv.is_finite(),
+                Vec2::ZERO,
+                "texture coordinates",
+                mesh,
+                warnings,
+            );
+            *uvs = Some(read);
+        }
+        if let Some(accessor) = attributes.color {
+            let mut colors = read_colors(&accessors[accessor], budget)?;
+            settle(&mut colors, |c| c.is_finite(), Vec4::ONE, "vertex colours", mesh, warnings);
+            colors.iter_mut().for_each(|color| *color = color.clamp(Vec4::ZERO, Vec4::ONE));
+            vertices.colors = Some(colors);
+        }
+        Ok(vertices)
+    }
+
+    fn settle_positions(&mut self, mesh: &Json<'_>, warnings: &mut Warnings) {
+        for (index, position) in self.positions.iter_mut().enumerate() {
+            if position.is_nan() || position.abs().max_element() > LARGEST_COORDINATE {
+                *position = Vec3::ZERO;
+                self.nowhere.push(index as u32);
+            }
+        }
+        if !self.nowhere.is_empty() {
+            let what = "triangles with infinite or NaN positions are not drawn";
+            warnings.about(what, mesh.called("mesh"));
+        }
+    }
+}
+
+/// Linear RGB or RGBA.
+fn read_colors(accessor: &Accessor<'_>, budget: &mut Budget) -> Result<Vec<Vec4>, Fault> {
+    if accessor.width == 3 {
+        budget.allocate("", accessor.count, size_of::<Vec4>())?;
+        let rgb = accessor.numbers::<3>(budget)?;
+        return Ok(rgb.into_iter().map(|[r, g, b]| Vec4::new(r, g, b, 1.0)).collect());
+    }
+    Ok(vectors(accessor.numbers::<4>(budget)?))
+}
+
+fn vectors<const N: usize, V: From<[f32; N]>>(arrays: Vec<[f32; N]>) -> Vec<V> {
+    arrays.into_iter().map(V::from).collect()
+}
+
+/// Replaces what is not `fine`, with a warning.
+fn settle<T: Copy>(
+    values: &mut [T],
+    fine: impl Fn(&T) -> bool,
+    replacement: T,
+    what: &str,
+    mesh: &Json<'_>,
+    warnings: &mut Warnings,
+) {
+    let mut replaced = 0;
+    for value in values.iter_mut().filter(|value| !fine(value)) {
+        *value = replacement;
+        replaced += 1;
+    }
+    if replaced > 0 {
+        warnings.about(format!("infinite or NaN {what} were replaced"), mesh.called("mesh"));
+    }
+}

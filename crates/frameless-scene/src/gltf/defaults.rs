@@ -1,0 +1,83 @@
+//! What a scene needs to be seen and the file does not have: a camera, and light. Every addition is a note.
+
+use glam::{Quat, Vec3};
+
+use crate::{Bounds, Camera, Geometry, Light, LightKind, Node, Projection, Scene, Transform};
+use crate::{frame_bounds, look_at};
+
+/// The angle between the top and the bottom of the added camera's picture: 40°, between a normal and a wide lens.
+const YFOV_RAD: f32 = 0.7;
+
+/// Adds a camera that shows everything at time 0, if the scene has none.
+pub(super) fn add_camera(scene: &mut Scene) {
+    /// Width / height. On a narrower canvas the sides are cut off.
+    const ASPECT: f32 = 4.0 / 3.0;
+    /// What is framed where there is nothing to be seen.
+    const EMPTY: Bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+    /// Half a millimetre: nearer than this, a camera would frame rounding errors.
+    const SMALLEST_RADIUS: f32 = 5e-4;
+    if !scene.cameras.is_empty() {
+        return;
+    }
+    let mut bounds = scene.bounds_at(&scene.state_at(0.0)).unwrap_or(EMPTY);
+    if bounds.radius() < SMALLEST_RADIUS {
+        let centre = bounds.centre();
+        bounds = Bounds { min: centre - Vec3::splat(0.5), max: centre + Vec3::splat(0.5) };
+    }
+    let view = frame_bounds(bounds, YFOV_RAD, ASPECT);
+    let (_, rotation, translation) = view.world_from_camera.to_scale_rotation_translation();
+    let node = add_node(scene, "added camera", translation, rotation);
+    let projection = Projection::Perspective { yfov_rad: YFOV_RAD };
+    scene.cameras.push(Camera { name: "added camera".to_owned(), node, projection });
+    scene.notes.push("no camera in the file: added one that shows everything".to_owned());
+}
+
+/// Adds light, if the scene has no lights.
+pub(super) fn add_light(scene: &mut Scene) {
+    if !scene.lights.is_empty() {
+        return;
+    }
+    if has_emissive_triangles(scene) {
+        // Lets the scene be seen by renderers that do not follow light from glowing surfaces to others.
+        scene.ambient = Vec3::splat(0.2);
+        let note = "no light in the file but glowing surfaces: added faint ambient light";
+        scene.notes.push(note.to_owned());
+        return;
+    }
+    add_key_light(scene);
+    // With the key light a white matte surface reaches a radiance of 1 where it faces the light, and 0.25 in its shadow.
+    scene.ambient = Vec3::splat(0.25);
+    scene.sky = [Vec3::new(0.25, 0.24, 0.23), Vec3::new(0.55, 0.7, 0.9)];
+    let note = "no light in the file: added a key light from above, ambient light and a sky";
+    scene.notes.push(note.to_owned());
+}
+
+/// A sun behind the added camera's left shoulder, so that what it shows has both lit and shaded sides.
+fn add_key_light(scene: &mut Scene) {
+    const TOWARDS_LIGHT: Vec3 = Vec3::new(-0.3, 0.8, 0.52);
+    /// E of a white matte surface's radiance E / π = 0.75.
+    const IRRADIANCE: f32 = 0.75 * std::f32::consts::PI;
+    let aim = look_at(TOWARDS_LIGHT, Vec3::ZERO, Vec3::Y);
+    let rotation = Quat::from_mat3a(&aim.matrix3);
+    let node = add_node(scene, "added key light", Vec3::ZERO, rotation);
+    scene.lights.push(Light {
+        node,
+        kind: LightKind::Directional,
+        intensity: Vec3::splat(IRRADIANCE),
+        range: f32::INFINITY,
+    });
+}
+
+fn has_emissive_triangles(scene: &Scene) -> bool {
+    let glows = |material: &u32| scene.materials[*material as usize].emissive != Vec3::ZERO;
+    scene.instances.iter().any(|instance| match &scene.geometries[instance.geometry as usize] {
+        Geometry::Mesh(mesh) => mesh.triangle_materials.iter().any(glows),
+        Geometry::Sphere { material } => glows(material),
+    })
+}
+
+fn add_node(scene: &mut Scene, name: &str, translation: Vec3, rotation: Quat) -> u32 {
+    let rest = Transform { translation, rotation, scale: Vec3::ONE };
+    scene.nodes.push(Node { name: name.to_owned(), parent: None, rest });
+    scene.nodes.len() as u32 - 1
+}

@@ -1,0 +1,62 @@
+//! Extensions: which are understood, and what is said about the others.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+
+use super::error::{Fault, Place, Problem, quoted};
+use super::json::Json;
+use super::warnings::Warnings;
+
+/// Extensions that are read. What of them is not drawn is warned about where it occurs.
+const SUPPORTED: [&str; 5] = [
+    "EXT_texture_webp",
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_unlit",
+    "KHR_mesh_quantization",
+];
+
+/// Refuses a file that cannot be understood without an extension which is not supported; warns of those without which it can.
+pub(super) fn check_extensions(
+    root: &Json<'_>,
+    value: &Value,
+    warnings: &mut Warnings,
+) -> Result<(), Fault> {
+    for required in root.list("extensionsRequired")? {
+        let name = required.text()?;
+        if !SUPPORTED.contains(&name) {
+            let place = Place::Pointer(required.pointer().to_owned());
+            let problem = Problem::RequiredExtension(quoted(name));
+            return Err(Fault { place, problem });
+        }
+    }
+    let mut names = BTreeSet::new();
+    for used in root.list("extensionsUsed")? {
+        names.insert(used.text()?);
+    }
+    collect_names(value, &mut names);
+    for name in names.into_iter().filter(|name| !SUPPORTED.contains(name)) {
+        warnings.add(format!("the extension {} is ignored", quoted(name)));
+    }
+    Ok(())
+}
+
+/// The keys of all `extensions` objects but those in `extras`; undeclared ones are ignored just like declared ones. Walks
+/// without recursion.
+fn collect_names<'a>(value: &'a Value, names: &mut BTreeSet<&'a str>) {
+    let mut open = vec![value];
+    while let Some(value) = open.pop() {
+        match value {
+            Value::Array(elements) => open.extend(elements),
+            Value::Object(members) => {
+                if let Some(Value::Object(extensions)) = members.get("extensions") {
+                    names.extend(extensions.keys().map(String::as_str));
+                }
+                let others = members.iter().filter(|(key, _)| *key != "extras");
+                open.extend(others.map(|(_, member)| member));
+            }
+            _ => {}
+        }
+    }
+}

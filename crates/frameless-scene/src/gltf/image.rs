@@ -1,0 +1,153 @@
+//! Pictures in the file: PNG, JPEG or WebP, told apart by their first bytes.
+//!
+//! A picture that cannot be decoded does not stop the scene: a magenta and grey checker stands in for it, which nobody takes
+//! for the real one, and a warning names it.
+
+use std::io::Cursor;
+
+use glam::DVec4;
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+
+use crate::Image;
+
+use super::document::Document;
+use super::error::{Fault, one_line};
+use super::json::Json;
+use super::limits::Budget;
+use super::uri::Uri;
+
+/// Where a picture's bytes are.
+#[derive(Debug)]
+enum Source<'a> {
+    Uri(Uri<'a>),
+    /// Index into the buffer views.
+    View(usize),
+    Missing,
+}
+
+/// A picture of the file, not yet read.
+#[derive(Debug)]
+pub(super) struct FileImage<'a> {
+    json: Json<'a>,
+    source: Source<'a>,
+}
+
+impl<'a> FileImage<'a> {
+    pub(super) fn parse(json: &Json<'a>, view_count: usize) -> Result<FileImage<'a>, Fault> {
+        let source = match (json.field("uri")?, json.field("bufferView")?) {
+            (Some(uri), _) => Source::Uri(Uri::parse(&uri)?),
+            (None, Some(view)) => Source::View(view.index(view_count, "buffer views")?),
+            (None, None) => Source::Missing,
+        };
+        Ok(FileImage { json: json.clone(), source })
+    }
+
+    /// The picture, or the checker with a warning.
+    pub(super) fn decode(&self, document: &mut Document<'_>) -> Image {
+        self.try_decode(document).unwrap_or_else(|fault| {
+            let what = "images that cannot be read are replaced by a magenta checker";
+            document.warnings.about(what, self.called_with(&fault));
+            checker()
+        })
+    }
+
+    /// The mean of all texels with RGB made linear, for textures that are not drawn texel by texel; `None`, with a warning,
+    /// if it cannot be decoded.
+    pub(super) fn mean(&self, decode_srgb: bool, document: &mut Document<'_>) -> Option<DVec4> {
+        match self.try_decode(document) {
+            Ok(image) => Some(mean(&image, decode_srgb)),
+            Err(fault) => {
+                let what = "images that cannot be read are left out";
+                document.warnings.about(what, self.called_with(&fault));
+                None
+            }
+        }
+    }
+
+    fn called_with(&self, fault: &Fault) -> String {
+        format!("{} ({})", self.json.called("image"), one_line(&fault.problem))
+    }
+
+    fn try_decode(&self, document: &mut Document<'_>) -> Result<Image, Fault> {
+        let pointer = self.json.pointer();
+        match &self.source {
+            Source::Missing => Err(Fault::at(pointer, "a uri or a bufferView", "neither")),
+            Source::View(view) => {
+                decode(document.views[*view].bytes, pointer, &mut document.budget)
+            }
+            Source::Uri(uri) => {
+                let bytes = uri.read(pointer, document.folder, &mut document.budget)?;
+                decode(&bytes, pointer, &mut document.budget)
+            }
+        }
+    }
+}
+
+/// Decodes an encoded picture after its header has been held against the limits.
+fn decode(bytes: &[u8], pointer: &str, budget: &mut Budget) -> Result<Image, Fault> {
+    let failed = |error: &dyn std::fmt::Display| Fault::at(pointer, "an image", error);
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let mut reader = reader.map_err(|error| failed(&error))?;
+    if !matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP)) {
+        return Err(Fault::at(pointer, "a PNG, JPEG or WebP image", "other bytes"));
+    }
+    reader.limits(decoder_limits(budget));
+    let decoder = reader.into_decoder().map_err(|error| failed(&error))?;
+    let (width, height) = decoder.dimensions();
+    budget.add_image(pointer, width, height)?;
+    if width == 0 || height == 0 {
+        return Err(Fault::at(pointer, "an image", "no pixels"));
+    }
+    let decoded = DynamicImage::from_decoder(decoder).map_err(|error| failed(&error))?;
+    let rgba = decoded.into_rgba8().pixels().map(|pixel| pixel.0).collect();
+    Ok(Image { width, height, rgba })
+}
+
+fn decoder_limits(budget: &Budget) -> image::Limits {
+    /// A decoder keeps a picture in up to 16 bits for each of four channels, and some of it twice.
+    const DECODER_BYTES_PER_PIXEL: u64 = 16;
+    let mut limits = image::Limits::default();
+    limits.max_alloc = Some(budget.limits.image_pixels.saturating_mul(DECODER_BYTES_PER_PIXEL));
+    limits
+}
+
+/// 8 × 8 texels, magenta and grey in turn.
+fn checker() -> Image {
+    const SIDE: u32 = 8;
+    const COLORS: [[u8; 4]; 2] = [[255, 0, 255, 255], [128, 128, 128, 255]];
+    let texel = |i: u32| COLORS[((i / SIDE + i % SIDE) % 2) as usize];
+    Image { width: SIDE, height: SIDE, rgba: (0..SIDE * SIDE).map(texel).collect() }
+}
+
+fn mean(image: &Image, decode_srgb: bool) -> DVec4 {
+    let linear: [f64; 256] = std::array::from_fn(|code| {
+        let value = code as f64 / 255.0;
+        if decode_srgb { linear_from_srgb(value) } else { value }
+    });
+    let sum: DVec4 = image
+        .rgba
+        .iter()
+        .map(|&[r, g, b, a]| {
+            let [r, g, b] = [r, g, b].map(|code| linear[usize::from(code)]);
+            DVec4::new(r, g, b, f64::from(a) / 255.0)
+        })
+        .sum();
+    sum / image.rgba.len() as f64
+}
+
+/// The sRGB transfer function (IEC 61966-2-1), in and out in [0, 1].
+fn linear_from_srgb(value: f64) -> f64 {
+    if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_of_srgb_is_taken_in_linear_light() {
+        let image = Image { width: 2, height: 1, rgba: vec![[0, 0, 0, 255], [255, 128, 255, 255]] };
+        let mean = mean(&image, true);
+        assert!((mean - DVec4::new(0.5, 0.107_93, 0.5, 1.0)).abs().max_element() < 1e-4, "{mean}");
+    }
+}

@@ -1,0 +1,71 @@
+//! The file's lights: KHR_lights_punctual.
+
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
+
+use glam::Vec3;
+
+use crate::{Light, LightKind};
+
+use super::error::Fault;
+use super::json::Json;
+use super::node::Hierarchy;
+
+const EXTENSION: &str = "KHR_lights_punctual";
+
+/// The lights at nodes of the scene, in the order of those nodes.
+pub(super) fn load_lights(root: &Json<'_>, hierarchy: &Hierarchy) -> Result<Vec<Light>, Fault> {
+    let definitions = match root.extension(EXTENSION)? {
+        Some(extension) => extension.list("lights")?,
+        None => Vec::new(),
+    };
+    let definitions = definitions.iter().map(parse_light).collect::<Result<Vec<_>, _>>()?;
+    let mut lights = Vec::new();
+    for (file_index, node) in root.list("nodes")?.iter().enumerate() {
+        let Some(extension) = node.extension(EXTENSION)? else { continue };
+        let light = extension.required("light")?.index(definitions.len(), "lights")?;
+        if let Some(index) = hierarchy.index_of[file_index] {
+            lights.push(Light { node: index, ..definitions[light] });
+        }
+    }
+    Ok(lights)
+}
+
+/// A light at node 0.
+fn parse_light(json: &Json<'_>) -> Result<Light, Fault> {
+    let color = Vec3::from_array(json.numbers_or("color", [1.0; 3])?);
+    let intensity = json.number_or("intensity", 1.0)?;
+    if intensity < 0.0 || color.min_element() < 0.0 || !(color * intensity).is_finite() {
+        return Err(json.fault("a light whose colour and intensity are not negative"));
+    }
+    let range = json.number_or("range", f32::INFINITY)?;
+    if range <= 0.0 {
+        return Err(json.fault("a light with a range above 0"));
+    }
+    let kind = json.required("type")?;
+    let kind = match kind.text()? {
+        "point" => LightKind::Point,
+        "directional" => LightKind::Directional,
+        "spot" => parse_cone(json)?,
+        _ => return Err(kind.fault("point, spot or directional")),
+    };
+    Ok(Light { node: 0, kind, intensity: color * intensity, range })
+}
+
+fn parse_cone(json: &Json<'_>) -> Result<LightKind, Fault> {
+    let Some(spot) = json.field("spot")? else { return Ok(cone(0.0, FRAC_PI_4)) };
+    let inner = spot.number_or("innerConeAngle", 0.0)?;
+    let outer = spot.number_or("outerConeAngle", FRAC_PI_4)?;
+    // Exporters write π/2 with too few digits, or equal angles for a sharp border.
+    const SLACK_RAD: f32 = 1e-4;
+    if inner < 0.0 || inner > outer + SLACK_RAD || outer <= 0.0 || outer > FRAC_PI_2 + SLACK_RAD {
+        return Err(spot.fault("cone angles with 0 <= inner <= outer <= π/2"));
+    }
+    Ok(cone(inner, outer))
+}
+
+fn cone(inner: f32, outer: f32) -> LightKind {
+    /// Narrowest border, as a difference of cosines: the fall-off divides by it.
+    const NARROWEST: f32 = 1e-4;
+    let cos_outer = outer.min(FRAC_PI_2).cos().clamp(0.0, 1.0 - NARROWEST);
+    LightKind::Spot { cos_inner: inner.cos().max(cos_outer + NARROWEST), cos_outer }
+}

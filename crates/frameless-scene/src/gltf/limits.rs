@@ -1,0 +1,161 @@
+//! How much a file may ask for, and what it has asked for so far.
+
+use super::error::{Fault, Place, Problem};
+
+/// Bounds on what one file may make the loader read, allocate and keep. They are checked before anything is allocated,
+/// against what the file *declares*, so that a file of a few bytes cannot claim gigabytes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Bytes of the scene file, and of each file that it names.
+    pub file_bytes: u64,
+    /// Bytes of everything decoded together: buffers, vertices, triangles, keyframes, texels.
+    pub decoded_bytes: u64,
+    /// Triangles of all meshes together, each mesh counted once however often it is instanced.
+    pub triangles: u64,
+    /// Vertices of all meshes together, counted likewise.
+    pub vertices: u64,
+    /// Texels of one image.
+    pub image_pixels: u64,
+    /// Texels of all images together.
+    pub total_pixels: u64,
+    /// Nodes in the file.
+    pub nodes: u64,
+    /// Nodes between the scene and its deepest node. The walk is iterative, so that depth costs no stack.
+    pub node_depth: u64,
+    /// Meshes at nodes.
+    pub instances: u64,
+    /// Keys of all animation channels together.
+    pub keyframes: u64,
+    /// Brackets around the innermost JSON value; more than 127 are refused in any case.
+    pub json_depth: u64,
+    /// Values, keys included, in the JSON document; each takes up to about 100 bytes while the file is read.
+    pub json_values: u64,
+}
+
+impl Default for Limits {
+    /// Room for anything that a workstation can trace interactively; about 4 GiB of memory at most.
+    fn default() -> Limits {
+        Limits {
+            file_bytes: 1 << 30,
+            decoded_bytes: 4 << 30,
+            triangles: 30_000_000,
+            vertices: 60_000_000,
+            image_pixels: 16_384 * 16_384,
+            total_pixels: 500_000_000,
+            nodes: 1_000_000,
+            node_depth: 200_000,
+            instances: 1_000_000,
+            keyframes: 20_000_000,
+            json_depth: 100,
+            json_values: 20_000_000,
+        }
+    }
+}
+
+/// What a file has used of its [`Limits`].
+#[derive(Debug)]
+pub(super) struct Budget {
+    pub(super) limits: Limits,
+    bytes: u64,
+    triangles: u64,
+    vertices: u64,
+    pixels: u64,
+    keyframes: u64,
+}
+
+impl Budget {
+    pub(super) fn new(limits: &Limits) -> Budget {
+        let limits = limits.clone();
+        Budget { limits, bytes: 0, triangles: 0, vertices: 0, pixels: 0, keyframes: 0 }
+    }
+
+    /// `count` things of `each` bytes are about to be allocated for what stands at `pointer`.
+    pub(super) fn allocate(
+        &mut self,
+        pointer: &str,
+        count: usize,
+        each: usize,
+    ) -> Result<(), Fault> {
+        let bytes = (count as u64).saturating_mul(each as u64);
+        spend(&mut self.bytes, bytes, self.limits.decoded_bytes, "decoded bytes", pointer)
+    }
+
+    pub(super) fn add_triangles(&mut self, pointer: &str, count: usize) -> Result<(), Fault> {
+        spend(&mut self.triangles, count as u64, self.limits.triangles, "triangles", pointer)
+    }
+
+    pub(super) fn add_vertices(&mut self, pointer: &str, count: usize) -> Result<(), Fault> {
+        // Triangles name vertices with 32 bits.
+        let limit = self.limits.vertices.min(u64::from(u32::MAX));
+        spend(&mut self.vertices, count as u64, limit, "vertices", pointer)
+    }
+
+    pub(super) fn add_keyframes(&mut self, pointer: &str, count: usize) -> Result<(), Fault> {
+        spend(&mut self.keyframes, count as u64, self.limits.keyframes, "keyframes", pointer)
+    }
+
+    /// An image of `width · height` texels is about to be decoded.
+    pub(super) fn add_image(
+        &mut self,
+        pointer: &str,
+        width: u32,
+        height: u32,
+    ) -> Result<(), Fault> {
+        let pixels = u64::from(width) * u64::from(height);
+        within(pixels, self.limits.image_pixels, "pixels in one image", pointer)?;
+        spend(&mut self.pixels, pixels, self.limits.total_pixels, "pixels in all images", pointer)?;
+        let limit = self.limits.decoded_bytes;
+        spend(&mut self.bytes, pixels.saturating_mul(4), limit, "decoded bytes", pointer)
+    }
+}
+
+/// Adds `more` to `total` unless that would pass `limit`.
+fn spend(
+    total: &mut u64,
+    more: u64,
+    limit: u64,
+    what: &'static str,
+    pointer: &str,
+) -> Result<(), Fault> {
+    let sum = total.saturating_add(more);
+    within(sum, limit, what, pointer)?;
+    *total = sum;
+    Ok(())
+}
+
+/// Refuses more than `limit`.
+pub(super) fn within(
+    came: u64,
+    limit: u64,
+    what: &'static str,
+    pointer: &str,
+) -> Result<(), Fault> {
+    if came <= limit {
+        return Ok(());
+    }
+    let place = Place::Pointer(pointer.to_owned());
+    Err(Fault { place, problem: Problem::Limit { what, came, limit } })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refused_request_uses_nothing() {
+        let mut budget = Budget::new(&Limits { decoded_bytes: 100, ..Limits::default() });
+        assert!(budget.allocate("/a", usize::MAX, 16).is_err());
+        assert!(budget.allocate("/a", 10, 10).is_ok());
+        assert!(budget.allocate("/a", 1, 1).is_err());
+    }
+
+    #[test]
+    fn one_image_and_all_images_are_limited() {
+        let limits = Limits { image_pixels: 10, total_pixels: 15, ..Limits::default() };
+        let mut budget = Budget::new(&limits);
+        assert!(budget.add_image("/images/0", 11, 1).is_err());
+        assert!(budget.add_image("/images/0", 5, 2).is_ok());
+        assert!(budget.add_image("/images/1", 3, 2).is_err());
+        assert!(budget.add_image("/images/1", u32::MAX, u32::MAX).is_err());
+    }
+}

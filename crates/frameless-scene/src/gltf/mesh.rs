@@ -1,0 +1,278 @@
+//! A glTF mesh: its primitives joined to one [`Mesh`] with a material per triangle.
+
+use std::collections::HashMap;
+
+use glam::{Vec2, Vec3, Vec4};
+
+use crate::{Geometry, Material, Mesh};
+
+use super::attributes::{Attributes, Vertices};
+use super::document::Document;
+use super::error::Fault;
+use super::json::Json;
+use super::normals::{flatten, repair};
+use super::topology::Topology;
+
+/// All meshes of the file, in its order; those without triangles are empty.
+///
+/// Triangles of primitives without a material get `materials.len()`.
+pub(super) fn load_meshes(
+    document: &mut Document<'_>,
+    materials: &[Material],
+) -> Result<Vec<Geometry>, Fault> {
+    let meshes = document.root.list("meshes")?;
+    meshes.iter().map(|json| load_mesh(json, document, materials)).collect()
+}
+
+fn load_mesh(
+    json: &Json<'_>,
+    document: &mut Document<'_>,
+    materials: &[Material],
+) -> Result<Geometry, Fault> {
+    let primitives = json.required("primitives")?.elements()?;
+    let primitives = primitives.iter().map(|json| Primitive::parse(json, document, materials));
+    let primitives = primitives.collect::<Result<Vec<_>, Fault>>()?;
+    let shaded_smoothly = primitives.iter().any(|primitive| primitive.attributes.normal.is_some());
+    let mut joiner =
+        Joiner { json, shaded_smoothly, mesh: Mesh::default(), first_vertex: HashMap::new() };
+    for primitive in &primitives {
+        warn_of_what_is_left_out(primitive, json, document, materials);
+        if primitive.attributes.position.is_some() && primitive.topology.is_some() {
+            joiner.add(primitive, document)?;
+        }
+    }
+    Ok(Geometry::Mesh(joiner.mesh))
+}
+
+/// A primitive whose references are known to lead somewhere.
+struct Primitive<'a> {
+    json: Json<'a>,
+    attributes: Attributes,
+    /// Accessor and where it is named.
+    indices: Option<(usize, Json<'a>)>,
+    /// `None`: points or lines.
+    topology: Option<Topology>,
+    material: Option<usize>,
+    /// What triangles store.
+    material_slot: u32,
+    is_morphed: bool,
+}
+
+impl<'a> Primitive<'a> {
+    fn parse(
+        json: &Json<'a>,
+        document: &mut Document<'_>,
+        materials: &[Material],
+    ) -> Result<Primitive<'a>, Fault> {
+        let attributes = Attributes::parse(json, &document.accessors, &mut document.warnings)?;
+        let accessors = document.accessors.len();
+        let indices = match json.field("indices")? {
+            Some(indices) => Some((indices.index(accessors, "accessors")?, indices)),
+            None => None,
+        };
+        let material = match json.field("material")? {
+            Some(material) => Some(material.index(materials.len(), "materials")?),
+            None => None,
+        };
+        let targets = json.list("targets")?;
+        for (_, target) in
+            targets.iter().map(Json::members).collect::<Result<Vec<_>, _>>()?.concat()
+        {
+            target.index(accessors, "accessors")?;
+        }
+        Ok(Primitive {
+            json: json.clone(),
+            attributes,
+            indices,
+            topology: Topology::parse(json)?,
+            material,
+            material_slot: material.unwrap_or(materials.len()) as u32,
+            is_morphed: !targets.is_empty(),
+        })
+    }
+}
+
+fn warn_of_what_is_left_out(
+    primitive: &Primitive<'_>,
+    mesh: &Json<'_>,
+    document: &mut Document<'_>,
+    materials: &[Material],
+) {
+    let mut warn = |what: &str| document.warnings.about(what, mesh.called("mesh"));
+    if primitive.topology.is_none() {
+        warn("points and lines are not drawn");
+    }
+    if primitive.attributes.position.is_none() {
+        warn("primitives without POSITION are not drawn");
+    }
+    if primitive.is_morphed {
+        warn("morph targets are not drawn: the mesh keeps its rest shape");
+    }
+    let texture = primitive.material.and_then(|material| materials[material].base_color_texture);
+    if texture.is_some_and(|texture| primitive.attributes.uvs[texture.uv_set as usize].is_none()) {
+        warn("a texture shows one texel only, as the mesh lacks its texture coordinates");
+    }
+}
+
+/// The primitives of a mesh so far.
+struct Joiner<'a> {
+    json: &'a Json<'a>,
+    /// Whether any primitive has normals, so that all need some.
+    shaded_smoothly: bool,
+    mesh: Mesh,
+    /// Where the vertices of an attribute set begin, and which of them are nowhere: primitives that share vertices in the
+    /// file share them here.
+    first_vertex: HashMap<Attributes, (u32, Vec<u32>)>,
+}
+
+impl Joiner<'_> {
+    fn add(&mut self, primitive: &Primitive<'_>, document: &mut Document<'_>) -> Result<(), Fault> {
+        let mut triangles = read_triangles(primitive, document)?;
+        let needs_flat_normals = self.shaded_smoothly && primitive.attributes.normal.is_none();
+        if needs_flat_normals {
+            let shared = self.read_vertices(&primitive.attributes, document)?;
+            let pointer = primitive.json.pointer();
+            document.budget.add_vertices(pointer, 3 * triangles.len())?;
+            document.budget.allocate(pointer, 3 * triangles.len(), BYTES_PER_VERTEX)?;
+            let vertices = flatten(&shared, &mut triangles);
+            let (first, nowhere) = self.append_vertices(vertices);
+            self.append_triangles(primitive, &triangles, first, &nowhere);
+            return Ok(());
+        }
+        if !self.first_vertex.contains_key(&primitive.attributes) {
+            let mut vertices = self.read_vertices(&primitive.attributes, document)?;
+            self.repair_normals(&mut vertices, &triangles, document);
+            let appended = self.append_vertices(vertices);
+            self.first_vertex.insert(primitive.attributes, appended);
+        }
+        let (first, nowhere) = self.first_vertex[&primitive.attributes].clone();
+        self.append_triangles(primitive, &triangles, first, &nowhere);
+        Ok(())
+    }
+
+    fn read_vertices(
+        &self,
+        attributes: &Attributes,
+        document: &mut Document<'_>,
+    ) -> Result<Vertices, Fault> {
+        let Document { accessors, budget, warnings, .. } = document;
+        Vertices::read(attributes, accessors, self.json, budget, warnings)
+    }
+
+    fn repair_normals(
+        &self,
+        vertices: &mut Vertices,
+        triangles: &[[u32; 3]],
+        document: &mut Document<'_>,
+    ) {
+        let Some(normals) = &mut vertices.normals else { return };
+        if repair(normals, &vertices.positions, triangles) > 0 {
+            let what = "normals without direction were taken from the triangles around";
+            document.warnings.about(what, self.json.called("mesh"));
+        }
+    }
+
+    /// Returns the index of the first of them, and which of them are nowhere.
+    fn append_vertices(&mut self, vertices: Vertices) -> (u32, Vec<u32>) {
+        let mesh = &mut self.mesh;
+        let first = mesh.positions.len();
+        mesh.positions.extend(vertices.positions);
+        let all = mesh.positions.len();
+        extend(&mut mesh.normals, vertices.normals, Vec3::Y, first, all);
+        for (uvs, more) in mesh.uvs.iter_mut().zip(vertices.uvs) {
+            extend(uvs, more, Vec2::ZERO, first, all);
+        }
+        extend(&mut mesh.colors, vertices.colors, Vec4::ONE, first, all);
+        (first as u32, vertices.nowhere)
+    }
+
+    fn append_triangles(
+        &mut self,
+        primitive: &Primitive<'_>,
+        triangles: &[[u32; 3]],
+        first_vertex: u32,
+        nowhere: &[u32],
+    ) {
+        let is_somewhere = |corner: &u32| nowhere.binary_search(corner).is_err();
+        let drawn = triangles
+            .iter()
+            .filter(|triangle| nowhere.is_empty() || triangle.iter().all(is_somewhere));
+        let drawn = drawn.map(|triangle| triangle.map(|corner| corner + first_vertex));
+        self.mesh.triangles.extend(drawn);
+        let count = self.mesh.triangles.len();
+        self.mesh.triangle_materials.resize(count, primitive.material_slot);
+    }
+}
+
+/// Position, normal, two texture coordinates, colour.
+const BYTES_PER_VERTEX: usize = 12 + 12 + 2 * 8 + 16;
+
+/// Appends `more` to `values` so that it is `all` long, unless it stays empty; vertices without a value get `filler`.
+fn extend<T: Copy>(values: &mut Vec<T>, more: Option<Vec<T>>, filler: T, first: usize, all: usize) {
+    match more {
+        Some(more) => {
+            values.resize(first, filler);
+            values.extend(more);
+        }
+        None if values.is_empty() => {}
+        None => values.resize(all, filler),
+    }
+}
+
+/// The triangles with indices into the primitive's own vertices, in bounds.
+fn read_triangles(
+    primitive: &Primitive<'_>,
+    document: &mut Document<'_>,
+) -> Result<Vec<[u32; 3]>, Fault> {
+    let (Some(position), Some(topology)) = (primitive.attributes.position, primitive.topology)
+    else {
+        return Ok(Vec::new());
+    };
+    let vertices = document.accessors[position].count;
+    let order = match &primitive.indices {
+        None => Order::Sequence(vertices),
+        Some((accessor, json)) => {
+            let indices = document.accessors[*accessor].indices(&mut document.budget)?;
+            Order::checked(indices, vertices, json)?
+        }
+    };
+    let count = topology.triangle_count(order.len());
+    let pointer = primitive.json.pointer();
+    document.budget.add_triangles(pointer, count)?;
+    document.budget.allocate(pointer, count, size_of::<[u32; 4]>())?;
+    Ok((0..count).map(|i| topology.corners(i).map(|corner| order.vertex(corner))).collect())
+}
+
+/// In which order vertices make triangles.
+enum Order {
+    /// As they come.
+    Sequence(usize),
+    /// As indices say.
+    Indices(Vec<u32>),
+}
+
+impl Order {
+    fn checked(indices: Vec<u32>, vertices: usize, json: &Json<'_>) -> Result<Order, Fault> {
+        match indices.iter().find(|&&index| index as usize >= vertices) {
+            None => Ok(Order::Indices(indices)),
+            Some(index) => {
+                let wanted = format!("indices below the number of vertices, {vertices}");
+                Err(Fault::at(json.pointer(), wanted, index))
+            }
+        }
+    }
+
+    fn len(&self) -> usize {
+        match self {
+            Order::Sequence(count) => *count,
+            Order::Indices(indices) => indices.len(),
+        }
+    }
+
+    fn vertex(&self, position: usize) -> u32 {
+        match self {
+            Order::Sequence(_) => position as u32,
+            Order::Indices(indices) => indices[position],
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! glTF 2.0 files become checked [`Scene`](crate::Scene)s. <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html>
+//!
+//! A scene file comes from strangers. So we walk the JSON ourselves rather than with the crate `gltf`, which panics and
+//! allocates what hostile files ask for, and whose errors do not say where: here every value knows its JSON pointer
+//! ([`json`]), every count, offset and sum is checked before anything is allocated ([`limits`]), and nothing recurses
+//! along what the file says.
+//!
+//! | read | drawn otherwise, with a warning | ignored with a warning | refused |
+//! |---|---|---|---|
+//! | `.glb`, `.gltf`, `data:` URIs, files in its folder | images that cannot be decoded: a checker | GLB chunks of other types | other versions than 2.x, required extensions that are unknown |
+//! | triangles, strips, fans; indexed or not; normalised, quantised, sparse | skins, morph targets: rest shape | points, lines | indices and references that lead nowhere |
+//! | nodes with TRS or matrix, the default scene | sheared matrices: without shear | other scenes | loops, two parents |
+//! | base colour, metallic, roughness, emissive (KHR_materials_emissive_strength), COLOR_0, TEXCOORD_0 and 1, EXT_texture_webp | metallic-roughness and emissive textures: their mean; BLEND, MASK: opaque; unlit: lit | normal and occlusion textures, texture transforms, other extensions | paths out of the folder |
+//! | cameras, KHR_lights_punctual | none in the file: added, with a note | | angles out of range |
+//! | TRS animation, all interpolations, all animations at once | unusable keys: without them | weights, pointers, what is driven twice | keys and values that do not match in number |
+
+mod accessor;
+mod animation;
+mod attributes;
+mod buffers;
+mod camera;
+mod container;
+mod defaults;
+mod document;
+mod error;
+mod extensions;
+mod image;
+mod json;
+mod light;
+mod limits;
+mod load;
+mod material;
+mod mesh;
+mod node;
+mod normals;
+mod texture;
+mod topology;
+mod uri;
+mod warnings;
+
+pub use error::{LoadError, Place, Problem};
+pub use limits::Limits;
+pub use load::{load, load_bytes, load_scene};
