@@ -1,1 +1,63 @@
-//! Placeholder.
+//! The window in which a frameless picture is looked at.
+//!
+//! Two threads that never wait for each other: the render loop (`session`, in `render_thread`) owns the engine, takes
+//! commands, and hands out a finished picture per refresh; the window (`app`) draws that picture, the panel and what is
+//! known about the picture, and turns hands on mouse and keys into commands. A third reads scenes that the user opens.
+//!
+//! Nothing that can be set clears the picture: not the size, not the sampler, not another scene.
+
+mod app;
+mod camera;
+mod command;
+mod heatmap;
+mod help;
+mod hud;
+mod legend;
+mod load;
+mod messages;
+mod navigation;
+mod no_display;
+mod options;
+mod overlay;
+mod pace;
+mod panel;
+mod picture;
+mod rate;
+mod render_thread;
+mod session;
+mod settings;
+mod shown;
+mod snapshot;
+mod stage;
+mod theme;
+mod timed;
+mod transport;
+
+use std::sync::Arc;
+
+use eframe::egui::{ViewportBuilder, vec2};
+use frameless_trace::World;
+
+pub use options::ViewOptions;
+pub use settings::{Overlay, PictureSize, Settings};
+
+/// Opens the window; returns when the user has closed it.
+///
+/// # Errors
+/// If there is no display, or none that the graphics driver can draw on; the message says what to run instead.
+pub fn run(options: ViewOptions) -> anyhow::Result<()> {
+    no_display::check(|name| std::env::var_os(name))?;
+    let world = Arc::new(World::new(Arc::clone(&options.scene)));
+    let [width, height] = options.window;
+    let window = ViewportBuilder::default()
+        .with_title(format!("{} – frameless", options.scene.name))
+        .with_app_id("frameless")
+        .with_inner_size(vec2(width, height))
+        .with_min_inner_size(vec2(480.0, 320.0))
+        .with_drag_and_drop(true);
+    let native = eframe::NativeOptions { viewport: window, ..Default::default() };
+    let create: eframe::AppCreator<'_> = Box::new(move |context| {
+        Ok(Box::new(app::App::new(context, world, options)?) as Box<dyn eframe::App>)
+    });
+    eframe::run_native("frameless", native, create).map_err(|error| no_display::explain(&error))
+}

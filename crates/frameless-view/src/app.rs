@@ -1,0 +1,351 @@
+//! The window: joins pictures, panel, camera and messages. Knows the render loop only through its channels.
+
+use std::sync::Arc;
+
+use eframe::egui::{self, Align2, CentralPanel, Context, Key, Panel, Rect, Sense, Ui};
+use eframe::egui_wgpu::RenderState;
+use frameless::{Clock, Size};
+use frameless_scene::Scene;
+use frameless_trace::{CpuTracer, ViewSource, World};
+use glam::Vec3;
+
+use crate::camera::FreeCamera;
+use crate::command::{Command, Picture, Report, Status, ViewChoice};
+use crate::hud::{self, Line};
+use crate::load::{Loading, Outcome};
+use crate::messages::Messages;
+use crate::navigation::Motion;
+use crate::overlay::Drawn;
+use crate::panel::{self, PanelState, Wish};
+use crate::picture::{PictureTexture, lay_out};
+use crate::render_thread::RenderThread;
+use crate::session::Session;
+use crate::settings::{Overlay, Settings};
+use crate::timed::Timed;
+use crate::transport::Transport;
+use crate::{ViewOptions, help, legend, load, snapshot, theme};
+
+/// From where the scene is looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Looking {
+    /// Through one of the scene's cameras, by index.
+    Through(u32),
+    /// The user has taken the camera.
+    Free(FreeCamera),
+}
+
+pub(crate) struct App {
+    scene: Arc<Scene>,
+    looking: Looking,
+    settings: Settings,
+    transport: Transport,
+    panel: PanelState,
+    panels_shown: bool,
+    help_shown: bool,
+    render: RenderThread<Arc<World>>,
+    target: RenderState,
+    texture: PictureTexture,
+    // None until the first picture.
+    status: Option<Status>,
+    // What the loop has been asked for already.
+    sent_settings: Settings,
+    sent_size: Size,
+    loading: Option<Loading>,
+    messages: Messages,
+    save_next: bool,
+    timed: Timed,
+    options: ViewOptions,
+}
+
+// The loop wakes the window for every picture; this is for when it has stopped, and for the spinner.
+const WAKE_AT_LEAST_SECS: f32 = 0.25;
+
+impl App {
+    /// Starts the render loop.
+    ///
+    /// # Errors
+    /// If there is no graphics device or no thread.
+    pub(crate) fn new(
+        context: &eframe::CreationContext<'_>,
+        world: Arc<World>,
+        options: ViewOptions,
+    ) -> anyhow::Result<App> {
+        theme::apply(&context.egui_ctx);
+        let target = context.wgpu_render_state.clone();
+        let target = target.ok_or_else(|| anyhow::anyhow!("there is no graphics device"))?;
+        let settings = options.settings;
+        let tracer = CpuTracer::new(
+            Arc::clone(&world),
+            ViewSource::Camera(0),
+            options.tracing.clone(),
+            options.threads,
+        );
+        let size = settings.picture.size_in(options.window.map(|side| side as u32));
+        let session = Session::new(size, Clock::real(), settings, options.seed, tracer);
+        let window = context.egui_ctx.clone();
+        let render = RenderThread::start(session, move || window.request_repaint())?;
+        render.send(Command::WantPicture { memory: Vec::new(), paint_secs: 0.0 });
+        Ok(App {
+            scene: Arc::clone(world.scene()),
+            looking: Looking::Through(0),
+            settings,
+            transport: Transport::default(),
+            panel: PanelState::default(),
+            panels_shown: true,
+            help_shown: false,
+            render,
+            target,
+            texture: PictureTexture::default(),
+            status: None,
+            sent_settings: settings,
+            sent_size: size,
+            loading: None,
+            messages: Messages::default(),
+            save_next: false,
+            timed: Timed::new(&options),
+            options,
+        })
+    }
+
+    /// Takes what the render loop has sent, and asks for the next picture.
+    fn receive(&mut self, now_secs: f64, paint_secs: f64) {
+        loop {
+            match self.render.report() {
+                Ok(None) => return,
+                Ok(Some(Report::Picture(picture))) => self.take_picture(picture, paint_secs),
+                Ok(Some(Report::Error(text))) => self.messages.error(text, now_secs),
+                Err(_) => {
+                    let text = "the renderer has stopped; please report what you did";
+                    self.messages.error(text.to_owned(), now_secs);
+                    return;
+                }
+            }
+        }
+    }
+
+    fn take_picture(&mut self, picture: Picture, paint_secs: f64) {
+        self.texture.upload(&self.target, &picture);
+        if std::mem::take(&mut self.save_next) {
+            let folder = self.options.save_to.clone();
+            let (scene, size, rgba) = (self.scene.name.clone(), picture.size, picture.rgba.clone());
+            // Compressing takes longer than a refresh.
+            self.messages.later(move || {
+                snapshot::save_numbered(&folder, &scene, size, &rgba)
+                    .map(|path| format!("saved {}", path.display()))
+            });
+        }
+        self.timed.shown(&picture.status, paint_secs);
+        self.status = Some(picture.status);
+        self.render.send(Command::WantPicture { memory: picture.rgba, paint_secs });
+    }
+
+    /// Begins to open a scene; what was being opened before is forgotten.
+    fn open(&mut self, name: String, context: &Context, now_secs: f64) {
+        let window = context.clone();
+        let wake = move || window.request_repaint();
+        let limits = self.options.limits.clone();
+        match Loading::start(name, move |name| load::open(name, &limits), wake) {
+            Ok(loading) => self.loading = Some(loading),
+            Err(error) => self.messages.error(error.to_string(), now_secs),
+        }
+    }
+
+    fn receive_loaded(&mut self, now_secs: f64) {
+        match self.loading.as_mut().map(Loading::poll) {
+            None | Some(Outcome::Running) => return,
+            Some(Outcome::Failed(text)) => self.messages.error(text, now_secs),
+            Some(Outcome::Ready(world)) => {
+                self.scene = Arc::clone(world.scene());
+                self.looking = Looking::Through(0);
+                self.render.send(Command::Scene(world));
+                self.messages.info(format!("opened {}", self.scene.name), now_secs);
+            }
+        }
+        self.loading = None;
+    }
+
+    fn look_through(&mut self, camera: u32) {
+        self.looking = Looking::Through(camera);
+        self.render.send(Command::View(ViewChoice::Camera(camera)));
+    }
+
+    /// The camera under the user's hands: the free one, or one that starts where the scene's is now.
+    fn taken_camera(&self) -> FreeCamera {
+        match self.looking {
+            Looking::Free(camera) => camera,
+            Looking::Through(camera) => {
+                let secs = self.status.as_ref().map_or(0.0, |status| status.scene_secs);
+                let state = self.scene.state_at(secs);
+                let bounds = self.scene.bounds_at(&state);
+                let focus = bounds.map_or(Vec3::ZERO, |bounds| bounds.centre());
+                FreeCamera::from_view(&self.scene.view_at(&state, camera), focus)
+            }
+        }
+    }
+
+    fn steer(&mut self, motion: &Motion, height: f32) {
+        if motion.is_still() {
+            return;
+        }
+        let mut camera = self.taken_camera();
+        motion.apply(&mut camera, height);
+        self.looking = Looking::Free(camera);
+        self.render.send(Command::View(ViewChoice::Free(camera.view())));
+    }
+
+    fn keys(&mut self, context: &Context) {
+        let pressed = |key| context.input(|input| input.key_pressed(key));
+        if pressed(Key::F12) {
+            self.save_next = true;
+        }
+        if pressed(Key::Escape) {
+            self.help_shown = false;
+            self.messages.clear();
+        }
+        if context.egui_wants_keyboard_input() {
+            return;
+        }
+        if pressed(Transport::KEY) {
+            let command = self.transport.toggle();
+            self.render.send(command);
+        }
+        if pressed(Key::H) || pressed(Key::Questionmark) {
+            self.help_shown = !self.help_shown;
+        }
+        if pressed(Key::P) {
+            self.panels_shown = !self.panels_shown;
+        }
+        if pressed(Key::Home) {
+            self.look_through(0);
+        }
+        let digits = [Key::Num0, Key::Num1, Key::Num2, Key::Num3, Key::Num4];
+        for (key, overlay) in digits.into_iter().zip(Overlay::ALL) {
+            if pressed(key) {
+                self.settings.overlay = overlay;
+            }
+        }
+    }
+
+    fn dropped_files(&mut self, context: &Context, now_secs: f64) {
+        let dropped = context.input(|input| {
+            input.raw.dropped_files.first().map(|file| file.path().to_string_lossy().into_owned())
+        });
+        if let Some(path) = dropped {
+            self.open(path, context, now_secs);
+        }
+    }
+
+    fn panels(&mut self, ui: &mut Ui, now_secs: f64) {
+        if !self.panels_shown {
+            return;
+        }
+        let camera = match self.looking {
+            Looking::Through(camera) => Some(camera),
+            Looking::Free(_) => None,
+        };
+        let frame = theme::panel_frame();
+        let side = Panel::right("settings").exact_size(250.0).resizable(false).frame(frame);
+        let wish = side.show(ui, |ui| {
+            panel::show(ui, &mut self.panel, &mut self.settings, &self.scene, camera)
+        });
+        match wish.inner {
+            None => {}
+            Some(Wish::Camera(camera)) => self.look_through(camera),
+            Some(Wish::Open(name)) => self.open(name, ui.ctx(), now_secs),
+            Some(Wish::Save) => self.save_next = true,
+            Some(Wish::Help) => self.help_shown = !self.help_shown,
+        }
+        let scene_secs = self.status.as_ref().map_or(0.0, |status| status.scene_secs);
+        let duration_secs = self.scene.animation.duration_secs;
+        let bar = Panel::bottom("time").resizable(false).frame(frame);
+        let commands = bar.show(ui, |ui| self.transport.show(ui, scene_secs, duration_secs));
+        commands.inner.into_iter().for_each(|command| self.render.send(command));
+    }
+
+    fn picture(&mut self, ui: &mut Ui, now_secs: f64) {
+        let place = ui.max_rect();
+        let response = ui.interact(place, ui.scope_id().with("picture"), Sense::click_and_drag());
+        let pixels_per_point = ui.pixels_per_point();
+        let place_px = place.size() * pixels_per_point;
+        self.send_size(self.settings.picture.size_in([place_px.x as u32, place_px.y as u32]));
+        if response.double_clicked() {
+            self.look_through(0);
+        }
+        let size = self.texture.size().unwrap_or(self.sent_size);
+        let drawn = lay_out(place, size, pixels_per_point);
+        let keys = !ui.ctx().egui_wants_keyboard_input();
+        let motion = ui.input(|input| Motion::read(&response, input, keys));
+        self.steer(&motion, drawn.height());
+        self.texture.paint(ui.painter(), drawn);
+        self.write_over(ui, place.shrink(10.0), now_secs);
+    }
+
+    fn send_size(&mut self, size: Size) {
+        if size != self.sent_size {
+            self.sent_size = size;
+            self.render.send(Command::Size(size));
+        }
+    }
+
+    /// HUD, messages, and the heat map's legend.
+    fn write_over(&mut self, ui: &mut Ui, place: Rect, now_secs: f64) {
+        let painter = ui.painter();
+        let mut free = place;
+        if let Some(status) = &self.status {
+            let lines = hud::lines(status, self.sent_size, &self.scene);
+            let lines: Vec<Line> = lines.into_iter().map(Line::plain).collect();
+            free = hud::below(free, hud::paint(painter, Align2::LEFT_TOP, free, &lines));
+            match &status.overlay {
+                Some(Drawn::HeatMap(legend)) => legend::paint(painter, place.expand(10.0), legend),
+                Some(Drawn::Unknown) => {
+                    let name = self.settings.sampler.name();
+                    let text = format!("sampler {name} has no {}", self.settings.overlay.name());
+                    let line = [Line::plain(text)];
+                    hud::paint(painter, Align2::LEFT_BOTTOM, place, &line);
+                }
+                None => {}
+            }
+        }
+        let messages = self.messages.lines(now_secs);
+        if !messages.is_empty() {
+            free = hud::below(free, hud::paint(painter, Align2::LEFT_TOP, free, &messages));
+        }
+        if let Some(loading) = &self.loading {
+            let text = format!("    {} {} …", loading.stage, loading.name);
+            let line = [Line::plain(text)];
+            let area = hud::paint(painter, Align2::LEFT_TOP, free, &line);
+            let middle = area.left_center() + egui::vec2(18.0, 0.0);
+            let spinner = Rect::from_center_size(middle, egui::vec2(14.0, 14.0));
+            ui.put(spinner, egui::Spinner::new().size(14.0));
+        }
+    }
+}
+
+impl eframe::App for App {
+    fn ui(&mut self, ui: &mut Ui, frame: &mut eframe::Frame) {
+        let context = ui.ctx().clone();
+        let now_secs = context.input(|input| input.time);
+        let paint_secs = f64::from(frame.info().cpu_usage.unwrap_or(0.0));
+        self.receive(now_secs, paint_secs);
+        self.receive_loaded(now_secs);
+        self.messages.receive(now_secs);
+        self.dropped_files(&context, now_secs);
+        self.keys(&context);
+        self.panels(ui, now_secs);
+        let backdrop = egui::Frame::NONE.fill(theme::BACKDROP);
+        CentralPanel::default().frame(backdrop).show(ui, |ui| self.picture(ui, now_secs));
+        if self.help_shown {
+            help::show(&context, &mut self.help_shown);
+        }
+        if self.settings != self.sent_settings {
+            self.sent_settings = self.settings;
+            self.render.send(Command::Settings(self.settings));
+        }
+        self.timed.act(&context, now_secs);
+        context.request_repaint_after_secs(WAKE_AT_LEAST_SECS);
+    }
+
+    fn on_exit(&mut self) {
+        self.timed.summarise();
+    }
+}

@@ -1,0 +1,132 @@
+//! Opening another scene while the present one keeps running.
+
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::thread::Builder;
+
+use frameless_scene::{Limits, Scene, builtin};
+use frameless_trace::World;
+
+/// A scene being read and prepared in a thread of its own.
+pub(crate) struct Loading {
+    /// What the user asked for.
+    pub(crate) name: String,
+    /// What is being done.
+    pub(crate) stage: &'static str,
+    progress: Receiver<Progress>,
+}
+
+enum Progress {
+    Stage(&'static str),
+    Done(anyhow::Result<Arc<World>>),
+}
+
+/// How far it is.
+pub(crate) enum Outcome {
+    /// Not there yet.
+    Running,
+    /// Ready for the renderer; [`World::scene`] is what was read.
+    Ready(Arc<World>),
+    /// Why not, for the user.
+    Failed(String),
+}
+
+/// A built-in scene by its name (`./NAME` is a file of that name), or a glTF file.
+///
+/// # Errors
+/// With what is wrong with the file.
+pub(crate) fn open(name: &str, limits: &Limits) -> anyhow::Result<Scene> {
+    match builtin(name) {
+        Some(scene) => Ok(scene),
+        None => Ok(frameless_scene::load(Path::new(name), limits)?),
+    }
+}
+
+impl Loading {
+    /// Begins to `open` what is called `name`. `wake` is called whenever there is news.
+    ///
+    /// # Errors
+    /// If the system has no thread left.
+    pub(crate) fn start(
+        name: String,
+        open: impl FnOnce(&str) -> anyhow::Result<Scene> + Send + 'static,
+        wake: impl Fn() + Send + 'static,
+    ) -> io::Result<Loading> {
+        let (report, progress) = channel();
+        let wanted = name.clone();
+        Builder::new().name("load scene".to_owned()).spawn(move || {
+            let world = open(&wanted).map(|scene| {
+                report.send(Progress::Stage("building the BVH of")).ok();
+                wake();
+                Arc::new(World::new(Arc::new(scene)))
+            });
+            // Fails if the user has opened something else since.
+            report.send(Progress::Done(world)).ok();
+            wake();
+        })?;
+        Ok(Loading { name, stage: "reading", progress })
+    }
+
+    /// What has happened since the last call.
+    pub(crate) fn poll(&mut self) -> Outcome {
+        loop {
+            match self.progress.try_recv() {
+                Ok(Progress::Stage(stage)) => self.stage = stage,
+                Ok(Progress::Done(Ok(world))) => return Outcome::Ready(world),
+                Ok(Progress::Done(Err(error))) => {
+                    return Outcome::Failed(format!("cannot open {}: {error:#}", self.name));
+                }
+                Err(TryRecvError::Empty) => return Outcome::Running,
+                // A panic has been printed by then.
+                Err(TryRecvError::Disconnected) => {
+                    return Outcome::Failed(format!(
+                        "cannot open {}: reading it failed unexpectedly; please report this file",
+                        self.name
+                    ));
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outcome(open: impl FnOnce(&str) -> anyhow::Result<Scene> + Send + 'static) -> Outcome {
+        let mut loading = Loading::start("x.glb".to_owned(), open, || {}).unwrap();
+        loop {
+            match loading.poll() {
+                Outcome::Running => std::thread::yield_now(),
+                ended => return ended,
+            }
+        }
+    }
+
+    #[test]
+    fn a_good_scene_becomes_a_world() {
+        let named = |_: &str| Ok(Scene { name: "good".to_owned(), ..Scene::default() });
+        let Outcome::Ready(world) = outcome(named) else { panic!("not ready") };
+        assert_eq!(world.scene().name, "good");
+    }
+
+    #[test]
+    fn built_in_scenes_have_names_and_files_have_paths() {
+        let limits = Limits::default();
+        assert_eq!(open("sphere", &limits).unwrap().name, "sphere");
+        let missing = open("./sphere", &limits).unwrap_err();
+        assert!(format!("{missing:#}").contains("./sphere"), "{missing:#}");
+    }
+
+    #[test]
+    fn a_bad_file_and_a_panic_are_both_said() {
+        let Outcome::Failed(text) = outcome(|_| anyhow::bail!("not a glTF file")) else {
+            panic!("opened")
+        };
+        assert_eq!(text, "cannot open x.glb: not a glTF file");
+        let Outcome::Failed(text) = outcome(|_| panic!("on purpose")) else { panic!("opened") };
+        assert!(text.contains("x.glb") && text.contains("unexpectedly"), "{text}");
+    }
+}

@@ -1,0 +1,79 @@
+//! How often the window is painted.
+//!
+//! The display's rate where painting is cheap. Where it is not (software rendering on few cores takes 10 ms and
+//! more), a fixed share of one core: what the window takes, the picture loses.
+
+use frameless::Time;
+
+/// Says when the next picture is due.
+#[derive(Clone, Debug)]
+pub(crate) struct Pace {
+    due: Time,
+    paint_secs: f64,
+}
+
+// A little less than 1/60 s: where the display waits for its refresh, that sets the rate and not this.
+const SHORTEST_SECS: f64 = 0.015;
+// Slower than 15 Hz is felt as stutter, whatever it costs.
+const LONGEST_SECS: f64 = 1.0 / 15.0;
+// Of one core, for painting.
+const SHARE: f64 = 0.25;
+// Of the newest paint in the learned cost: one slow paint is no reason to slow down.
+const LEARNING_RATE: f64 = 0.1;
+
+impl Pace {
+    /// Due at once.
+    pub(crate) fn new() -> Pace {
+        Pace { due: Time::ZERO, paint_secs: 0.0 }
+    }
+
+    /// Told what the window's last paint cost, in seconds without waiting for the display.
+    pub(crate) fn painted(&mut self, paint_secs: f64) {
+        if paint_secs.is_finite() {
+            self.paint_secs += LEARNING_RATE * (paint_secs - self.paint_secs);
+        }
+    }
+
+    /// Whether a picture is due; if so, the next one is due an interval later.
+    pub(crate) fn is_due(&mut self, now: Time) -> bool {
+        if now < self.due {
+            return false;
+        }
+        // What was missed is not made up for.
+        self.due = Time::from_secs(now.secs() + self.interval_secs());
+        true
+    }
+
+    /// Seconds between two pictures.
+    pub(crate) fn interval_secs(&self) -> f64 {
+        (self.paint_secs / SHARE).clamp(SHORTEST_SECS, LONGEST_SECS)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn due_in_a_second(pace: &mut Pace) -> usize {
+        (0..1000).filter(|&ms| pace.is_due(Time::from_secs(1e-3 * f64::from(ms)))).count()
+    }
+
+    #[test]
+    fn cheap_painting_goes_at_the_displays_rate() {
+        let mut pace = Pace::new();
+        pace.painted(0.001);
+        assert!((60..=67).contains(&due_in_a_second(&mut pace)));
+    }
+
+    #[test]
+    fn dear_painting_goes_at_a_quarter_of_a_core() {
+        let mut pace = Pace::new();
+        (0..100).for_each(|_| pace.painted(0.01));
+        let painted = due_in_a_second(&mut pace);
+        assert!((24..=26).contains(&painted), "{painted} × 10 ms");
+        (0..100).for_each(|_| pace.painted(5.0));
+        assert_eq!(pace.interval_secs(), LONGEST_SECS);
+        pace.painted(f64::NAN);
+        assert_eq!(pace.interval_secs(), LONGEST_SECS);
+    }
+}

@@ -1,0 +1,207 @@
+//! The panel at the side: what can be set.
+
+use eframe::egui::{ComboBox, Key, RichText, ScrollArea, Slider, TextEdit, Ui};
+use frameless::{DEFAULT_TILE, DEFAULT_W_D, SamplerKind, Size};
+use frameless_scene::Scene;
+
+use crate::settings::{Overlay, PictureSize, Settings};
+
+/// What the panel remembers that is no setting.
+pub(crate) struct PanelState {
+    /// What is typed into the field for a file.
+    path: String,
+    /// The parameters of sampler `change`, while another one runs.
+    change: SamplerKind,
+    /// The slider of the budget, while there is none.
+    samples_per_sec: f64,
+}
+
+impl Default for PanelState {
+    fn default() -> Self {
+        // The sketch's rate, so that ticking the box shows what it was about.
+        let samples_per_sec = 900_000.0;
+        PanelState { path: String::new(), change: SamplerKind::CHANGE, samples_per_sec }
+    }
+}
+
+/// What the user asked for in the panel, apart from settings.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Wish {
+    /// Look through one of the scene's cameras.
+    Camera(u32),
+    /// Open a file.
+    Open(String),
+    /// Save the picture.
+    Save,
+    /// Show or hide the keys.
+    Help,
+}
+
+/// Draws the panel. `camera` is the scene's camera in use; none while the user has it.
+pub(crate) fn show(
+    ui: &mut Ui,
+    state: &mut PanelState,
+    settings: &mut Settings,
+    scene: &Scene,
+    camera: Option<u32>,
+) -> Option<Wish> {
+    let mut wish = None;
+    ScrollArea::vertical().show(ui, |ui| {
+        section(ui, "Scene");
+        wish = scene_part(ui, state, scene, camera);
+        section(ui, "Sampler");
+        sampler_part(ui, state, settings);
+        section(ui, "Rays");
+        budget_part(ui, state, settings);
+        section(ui, "Picture");
+        picture_part(ui, settings);
+        section(ui, "Show");
+        for overlay in Overlay::ALL {
+            let name = if overlay == Overlay::None { "the picture" } else { overlay.name() };
+            ui.radio_value(&mut settings.overlay, overlay, name);
+        }
+        section(ui, "");
+        ui.horizontal(|ui| {
+            if ui.button("Save PNG").on_hover_text("F12").clicked() {
+                wish = Some(Wish::Save);
+            }
+            if ui.button("Keys").on_hover_text("H").clicked() {
+                wish = Some(Wish::Help);
+            }
+        });
+    });
+    wish
+}
+
+fn section(ui: &mut Ui, title: &str) {
+    ui.add_space(6.0);
+    if !title.is_empty() {
+        ui.label(RichText::new(title).small().weak());
+    }
+}
+
+fn scene_part(
+    ui: &mut Ui,
+    state: &mut PanelState,
+    scene: &Scene,
+    camera: Option<u32>,
+) -> Option<Wish> {
+    let mut wish = None;
+    ui.heading(&scene.name);
+    let selected = camera.map_or("free camera".to_owned(), |camera| camera_name(scene, camera));
+    ComboBox::from_id_salt("camera").selected_text(selected).width(200.0).truncate().show_ui(
+        ui,
+        |ui| {
+            for index in 0..scene.cameras.len() as u32 {
+                let chosen = camera == Some(index);
+                if ui.selectable_label(chosen, camera_name(scene, index)).clicked() {
+                    wish = Some(Wish::Camera(index));
+                }
+            }
+        },
+    );
+    ui.horizontal(|ui| {
+        let hint = "path of a .glb or .gltf";
+        let field = TextEdit::singleline(&mut state.path).hint_text(hint).desired_width(140.0);
+        let entered = ui.add(field).lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+        let clicked = ui.button("Open").clicked();
+        if (entered || clicked) && !state.path.trim().is_empty() {
+            wish = Some(Wish::Open(state.path.trim().to_owned()));
+        }
+    });
+    wish
+}
+
+fn camera_name(scene: &Scene, camera: u32) -> String {
+    match scene.cameras.get(camera as usize).map(|camera| camera.name.as_str()) {
+        None | Some("") => format!("camera {camera}"),
+        Some(name) => format!("camera {camera}: {name}"),
+    }
+}
+
+fn sampler_part(ui: &mut Ui, state: &mut PanelState, settings: &mut Settings) {
+    if matches!(settings.sampler, SamplerKind::Change { .. }) {
+        state.change = settings.sampler;
+    }
+    ComboBox::from_id_salt("sampler").selected_text(settings.sampler.name()).width(200.0).show_ui(
+        ui,
+        |ui| {
+            for kind in [SamplerKind::Random, SamplerKind::Permutation, state.change] {
+                ui.selectable_value(&mut settings.sampler, kind, kind.name());
+            }
+        },
+    );
+    if let SamplerKind::Change { w_d, tile } = &mut settings.sampler {
+        ui.add(Slider::new(w_d, 0.0..=1.0).fixed_decimals(2).text("w_d"))
+            .on_hover_text(format!("weight of change against age ({DEFAULT_W_D})"));
+        ui.add(Slider::new(tile, 1..=64).logarithmic(true).text("tile px"))
+            .on_hover_text(format!("side of a tile in pixels ({DEFAULT_TILE})"));
+    }
+}
+
+// From a picture of 512×384 in three minutes to more than a CPU traces.
+const BUDGETS: std::ops::RangeInclusive<f64> = 1e3..=1e8;
+
+fn budget_part(ui: &mut Ui, state: &mut PanelState, settings: &mut Settings) {
+    let mut limited = settings.samples_per_sec.is_some();
+    ui.checkbox(&mut limited, "at most");
+    let per_sec = settings.samples_per_sec.as_mut().unwrap_or(&mut state.samples_per_sec);
+    let slider = Slider::new(per_sec, BUDGETS)
+        .logarithmic(true)
+        .custom_formatter(|per_sec, _| metric(per_sec))
+        .text("samples/s");
+    ui.add_enabled(limited, slider);
+    state.samples_per_sec = *per_sec;
+    settings.samples_per_sec = limited.then_some(state.samples_per_sec);
+}
+
+/// 900000 → 900 k.
+fn metric(number: f64) -> String {
+    match number {
+        1e6.. => format!("{:.2} M", number / 1e6),
+        1e3.. => format!("{:.0} k", number / 1e3),
+        _ => format!("{number:.0}"),
+    }
+}
+
+fn picture_part(ui: &mut Ui, settings: &mut Settings) {
+    ui.add(Slider::new(&mut settings.exposure_stops, -8.0..=8.0).fixed_decimals(1).text("stops"))
+        .on_hover_text("exposure: brighter by this power of two");
+    let fixed = [(320, 240), (512, 384), (640, 480), (1024, 768), (1280, 720), (1920, 1080)];
+    let fixed = fixed.map(|(width, height)| PictureSize::Fixed(Size::new(width, height)));
+    let window = match settings.picture {
+        window @ PictureSize::Window { .. } => window,
+        PictureSize::Fixed(_) => PictureSize::default(),
+    };
+    ComboBox::from_id_salt("size").selected_text(size_name(settings.picture)).width(200.0).show_ui(
+        ui,
+        |ui| {
+            for size in std::iter::once(window).chain(fixed) {
+                ui.selectable_value(&mut settings.picture, size, size_name(size));
+            }
+        },
+    );
+}
+
+fn size_name(size: PictureSize) -> String {
+    match size {
+        PictureSize::Window { .. } => "as large as the window".to_owned(),
+        PictureSize::Fixed(Size { width, height }) => format!("{width} × {height}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_are_short() {
+        let written = [1e3, 22_600.0, 900_000.0, 3.6e6].map(metric);
+        assert_eq!(written, ["1 k", "23 k", "900 k", "3.60 M"]);
+    }
+
+    #[test]
+    fn cameras_without_a_name_have_a_number() {
+        assert_eq!(camera_name(&Scene::default(), 3), "camera 3");
+    }
+}

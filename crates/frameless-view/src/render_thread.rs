@@ -1,0 +1,111 @@
+//! The render loop in a thread of its own: neither the window nor the loop ever waits for the other.
+
+use std::io;
+use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+use std::thread::{Builder, JoinHandle};
+
+use frameless::Time;
+
+use crate::command::{Command, Report};
+use crate::pace::Pace;
+use crate::session::{Session, Stage};
+
+/// A running loop. Ends when dropped.
+pub(crate) struct RenderThread<W> {
+    // Taken on drop: that the channel is closed is the sign to end.
+    commands: Option<Sender<Command<W>>>,
+    reports: Receiver<Report>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// The loop has ended, which it does by itself only when the renderer panics.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Ended;
+
+impl<W: Send + 'static> RenderThread<W> {
+    /// Starts the loop. `wake` is called after every report.
+    ///
+    /// # Errors
+    /// If the system has no thread left.
+    pub(crate) fn start<S: Stage<World = W> + Send + 'static>(
+        session: Session<S>,
+        wake: impl Fn() + Send + 'static,
+    ) -> io::Result<RenderThread<W>> {
+        let (to_loop, commands) = channel();
+        let (to_window, reports) = channel();
+        let thread = Builder::new()
+            .name("render loop".to_owned())
+            .spawn(move || run(session, &commands, &to_window, wake))?;
+        Ok(RenderThread { commands: Some(to_loop), reports, thread: Some(thread) })
+    }
+
+    /// Ask for something. Lost if the loop has ended, which [`RenderThread::report`] says.
+    pub(crate) fn send(&self, command: Command<W>) {
+        if let Some(commands) = &self.commands {
+            commands.send(command).ok();
+        }
+    }
+
+    /// What the loop has to say, if anything.
+    ///
+    /// # Errors
+    /// If the loop has ended.
+    pub(crate) fn report(&self) -> Result<Option<Report>, Ended> {
+        match self.reports.try_recv() {
+            Ok(report) => Ok(Some(report)),
+            Err(TryRecvError::Empty) => Ok(None),
+            Err(TryRecvError::Disconnected) => Err(Ended),
+        }
+    }
+}
+
+impl<W> Drop for RenderThread<W> {
+    fn drop(&mut self) {
+        self.commands = None;
+        if let Some(thread) = self.thread.take() {
+            // A panic in there has been printed already, and the window is closing.
+            thread.join().ok();
+        }
+    }
+}
+
+// A renderer that fails does so a thousand times a second.
+const SECS_BETWEEN_ERRORS: f64 = 2.0;
+
+fn run<S: Stage>(
+    mut session: Session<S>,
+    commands: &Receiver<Command<S::World>>,
+    reports: &Sender<Report>,
+    wake: impl Fn(),
+) {
+    let mut pace = Pace::new();
+    let mut wanted = None;
+    let mut next_error = Time::ZERO;
+    // Sending fails once the window is gone; then the channel of commands is closed, too.
+    let report = |report| {
+        reports.send(report).ok();
+        wake();
+    };
+    loop {
+        loop {
+            match commands.try_recv() {
+                Ok(Command::WantPicture { memory, paint_secs }) => {
+                    pace.painted(paint_secs);
+                    wanted = Some(memory);
+                }
+                Ok(command) => session.apply(command),
+                Err(TryRecvError::Empty) => break,
+                Err(TryRecvError::Disconnected) => return,
+            }
+        }
+        if let Err(error) = session.step()
+            && session.now() >= next_error
+        {
+            next_error = Time::from_secs(session.now().secs() + SECS_BETWEEN_ERRORS);
+            report(Report::Error(error.to_string()));
+        }
+        if wanted.is_some() && pace.is_due(session.now()) {
+            report(Report::Picture(session.picture(wanted.take().unwrap_or_default())));
+        }
+    }
+}

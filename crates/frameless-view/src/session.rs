@@ -1,0 +1,312 @@
+//! The render loop as the window sees it: an engine that takes commands and hands out pictures.
+//!
+//! No thread and no window here: see `render_thread.rs`.
+
+use frameless::{Clock, Display, Engine, EngineError, Size, Time, Tracer};
+
+use crate::command::{Command, Picture, Status, ViewChoice};
+use crate::overlay::HeatMaps;
+use crate::rate::Counted;
+use crate::settings::{Overlay, Settings};
+use crate::shown::{self, Shown};
+
+/// A renderer that can be pointed at another scene or from another place.
+pub(crate) trait Stage: Tracer {
+    /// A scene made ready for this renderer, in another thread.
+    type World: Send + 'static;
+
+    /// Batches submitted from now on look from there.
+    fn set_view(&mut self, view: ViewChoice);
+
+    /// Batches submitted from now on show that scene.
+    fn set_world(&mut self, world: Self::World);
+}
+
+/// An engine with its settings.
+pub(crate) struct Session<S> {
+    engine: Engine<Counted<S>>,
+    settings: Settings,
+    seed: u64,
+    shown: Shown,
+    heat_maps: HeatMaps,
+    throughput: Throughput,
+}
+
+impl<S: Stage> Session<S> {
+    /// A black picture.
+    pub(crate) fn new(size: Size, clock: Clock, settings: Settings, seed: u64, stage: S) -> Self {
+        let sampler = settings.sampler.build(seed);
+        let mut engine = Engine::new(size, clock, sampler, Counted::new(stage));
+        engine.set_budget(settings.samples_per_sec);
+        engine.set_display(Display::new(settings.exposure_stops));
+        let shown = Shown::new(engine.canvas(), *engine.display());
+        let (heat_maps, throughput) = (HeatMaps::default(), Throughput::default());
+        Session { engine, settings, seed, shown, heat_maps, throughput }
+    }
+
+    /// One turn of the loop.
+    pub(crate) fn step(&mut self) -> Result<usize, EngineError> {
+        self.engine.step()
+    }
+
+    /// The present time of the engine's clock.
+    pub(crate) fn now(&self) -> Time {
+        self.engine.now()
+    }
+
+    /// Does what the window asks for; a wish for a picture is for the caller to keep.
+    pub(crate) fn apply(&mut self, command: Command<S::World>) {
+        let now = self.engine.now();
+        match command {
+            Command::Settings(settings) => self.set(settings),
+            Command::Size(size) => {
+                self.engine.resize(size);
+                self.shown.forget();
+            }
+            Command::View(view) => self.engine.tracer_mut().tracer.set_view(view),
+            Command::Scene(world) => {
+                let stage = &mut self.engine.tracer_mut().tracer;
+                stage.set_world(world);
+                stage.set_view(ViewChoice::Camera(0));
+                self.engine.timeline_mut().seek(now, 0.0);
+            }
+            Command::Play(true) => self.engine.timeline_mut().play(now),
+            Command::Play(false) => self.engine.timeline_mut().pause(now),
+            Command::Seek(scene_secs) => self.engine.timeline_mut().seek(now, scene_secs),
+            Command::Speed(speed) => self.engine.timeline_mut().set_speed(now, speed),
+            Command::WantPicture { .. } => {}
+        }
+    }
+
+    /// Applies what differs, so that moving one slider does not make the sampler forget what it has learned.
+    fn set(&mut self, new: Settings) {
+        let old = std::mem::replace(&mut self.settings, new);
+        if new.sampler != old.sampler {
+            // Another seed than before: a sampler chosen again does not repeat itself.
+            self.seed = self.seed.wrapping_add(1);
+            self.engine.set_sampler(new.sampler.build(self.seed));
+        }
+        if new.samples_per_sec != old.samples_per_sec {
+            self.engine.set_budget(new.samples_per_sec);
+        }
+        if new.exposure_stops != old.exposure_stops {
+            self.engine.set_display(Display::new(new.exposure_stops));
+        }
+        if new.overlay != Overlay::SamplingRate {
+            self.engine.tracer_mut().stop_counting();
+        }
+    }
+
+    /// The picture now, in reused memory.
+    pub(crate) fn picture(&mut self, memory: Vec<[u8; 4]>) -> Picture {
+        let now = self.engine.now();
+        self.shown.update(self.engine.canvas(), *self.engine.display());
+        let mut rgba = memory;
+        rgba.clear();
+        rgba.extend_from_slice(self.shown.rgba());
+        let overlay = self.heat_maps.draw(self.settings.overlay, &mut self.engine, &mut rgba);
+        let status = Status {
+            scene_secs: self.engine.timeline().scene_secs(now),
+            samples_per_sec: self.throughput.update(now, self.engine.counters().kept),
+            ages: shown::ages(self.engine.canvas(), now),
+            overlay,
+        };
+        Picture { size: self.engine.canvas().size(), rgba, status }
+    }
+}
+
+/// Samples per second over the last stretch of at least [`STRETCH_SECS`].
+#[derive(Clone, Copy, Debug, Default)]
+struct Throughput {
+    since: Time,
+    kept: u64,
+    per_sec: f64,
+}
+
+// Shorter and the number flickers, longer and it lags behind the slider.
+const STRETCH_SECS: f64 = 0.25;
+
+impl Throughput {
+    fn update(&mut self, now: Time, kept: u64) -> f64 {
+        let secs = now.secs_since(self.since);
+        if secs >= STRETCH_SECS {
+            let per_sec = (kept - self.kept) as f64 / secs;
+            *self = Throughput { since: now, kept, per_sec };
+        }
+        self.per_sec
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use frameless::{Answer, Batch, Function, SamplerKind};
+
+    use super::*;
+    use crate::overlay::Drawn;
+
+    /// A renderer of one colour per world; counts what it is told.
+    struct Plain {
+        grey: f32,
+        view: ViewChoice,
+        function: Function<fn(&Batch) -> Vec<[f32; 3]>>,
+    }
+
+    fn black(batch: &Batch) -> Vec<[f32; 3]> {
+        vec![[0.0; 3]; batch.requests.len()]
+    }
+
+    impl Tracer for Plain {
+        fn submit(&mut self, batch: Batch) {
+            self.function.submit(batch)
+        }
+
+        fn collect(&mut self, wait: bool) -> Option<Answer> {
+            let mut answer = self.function.collect(wait)?;
+            answer.rgb.fill([self.grey; 3]);
+            Some(answer)
+        }
+    }
+
+    impl Stage for Plain {
+        type World = f32;
+
+        fn set_view(&mut self, view: ViewChoice) {
+            self.view = view;
+        }
+
+        fn set_world(&mut self, grey: f32) {
+            self.grey = grey;
+        }
+    }
+
+    /// A session with every pixel traced at least once.
+    fn white_session() -> Session<Plain> {
+        let stage = Plain {
+            grey: 1.0,
+            view: ViewChoice::Camera(0),
+            function: Function::new(black as fn(&Batch) -> Vec<[f32; 3]>),
+        };
+        let settings = Settings { sampler: SamplerKind::Permutation, ..Settings::default() };
+        let clock = Clock::simulated(100_000.0);
+        let mut session = Session::new(Size::new(40, 30), clock, settings, 1, stage);
+        run(&mut session, 0.1);
+        assert_eq!(brightness(&mut session), 255.0);
+        session
+    }
+
+    fn run(session: &mut Session<Plain>, secs: f64) {
+        let end = Time::from_secs(session.now().secs() + secs);
+        while session.now() < end {
+            session.step().unwrap();
+        }
+    }
+
+    /// Mean of the picture's red channel.
+    fn brightness(session: &mut Session<Plain>) -> f64 {
+        let picture = session.picture(Vec::new());
+        assert_eq!(picture.rgba.len(), picture.size.pixels());
+        let sum: f64 = picture.rgba.iter().map(|&[red, ..]| f64::from(red)).sum();
+        sum / picture.rgba.len() as f64
+    }
+
+    #[test]
+    fn the_picture_survives_every_change_of_settings() {
+        let mut session = white_session();
+        let before = session.settings;
+        for sampler in [SamplerKind::Random, SamplerKind::Change { w_d: 0.5, tile: 7 }] {
+            session.apply(Command::Settings(Settings { sampler, ..before }));
+            assert_eq!(brightness(&mut session), 255.0, "{sampler:?}");
+        }
+        let budget = Settings { samples_per_sec: Some(1000.0), ..before };
+        session.apply(Command::Settings(budget));
+        session.apply(Command::View(ViewChoice::Camera(1)));
+        session.apply(Command::Play(false));
+        session.apply(Command::Seek(1.0));
+        session.apply(Command::Speed(2.0));
+        assert_eq!(brightness(&mut session), 255.0);
+        assert_eq!(session.engine.tracer().tracer.view, ViewChoice::Camera(1));
+    }
+
+    #[test]
+    fn the_picture_survives_a_resize() {
+        let mut session = white_session();
+        session.apply(Command::Size(Size::new(77, 13)));
+        assert_eq!(session.picture(Vec::new()).size, Size::new(77, 13));
+        assert_eq!(brightness(&mut session), 255.0);
+    }
+
+    #[test]
+    fn another_scene_takes_the_picture_over_pixel_by_pixel() {
+        let mut session = white_session();
+        session.apply(Command::View(ViewChoice::Camera(3)));
+        session.apply(Command::Scene(0.0));
+        assert_eq!(brightness(&mut session), 255.0);
+        assert_eq!(session.engine.tracer().tracer.view, ViewChoice::Camera(0));
+        assert_eq!(session.picture(Vec::new()).status.scene_secs, 0.0);
+        // 1,200 pixels at 100,000 samples/s take 12 ms.
+        run(&mut session, 0.006);
+        let half = brightness(&mut session);
+        assert!((64.0..192.0).contains(&half), "half the pixels are new: {half}");
+        run(&mut session, 0.05);
+        assert_eq!(brightness(&mut session), 0.0);
+    }
+
+    #[test]
+    fn exposure_changes_the_picture_without_a_sample() {
+        let mut session = white_session();
+        let exposure_stops = -2.0;
+        session.apply(Command::Settings(Settings { exposure_stops, ..session.settings }));
+        // sRGB of 0.25 is 0.537.
+        assert_eq!(brightness(&mut session), 137.0);
+    }
+
+    #[test]
+    fn pausing_stops_the_scenes_time_and_not_the_loop() {
+        let mut session = white_session();
+        session.apply(Command::Play(false));
+        let before = session.picture(Vec::new()).status.scene_secs;
+        let kept = session.engine.counters().kept;
+        run(&mut session, 0.1);
+        assert_eq!(session.picture(Vec::new()).status.scene_secs, before);
+        assert!(session.engine.counters().kept > kept + 5_000);
+    }
+
+    #[test]
+    fn every_overlay_has_a_legend_and_the_picture_comes_back() {
+        let mut session = white_session();
+        let change = Settings { sampler: SamplerKind::CHANGE, ..session.settings };
+        for overlay in Overlay::ALL.into_iter().filter(|&overlay| overlay != Overlay::None) {
+            session.apply(Command::Settings(Settings { overlay, ..change }));
+            session.picture(Vec::new());
+            run(&mut session, 0.5);
+            let drawn = session.picture(Vec::new()).status.overlay;
+            assert!(matches!(drawn, Some(Drawn::HeatMap(_))), "{overlay:?}: {drawn:?}");
+            assert_ne!(brightness(&mut session), 255.0, "{overlay:?}");
+        }
+        session.apply(Command::Settings(change));
+        assert_eq!(session.picture(Vec::new()).status.overlay, None);
+        assert_eq!(brightness(&mut session), 255.0);
+    }
+
+    #[test]
+    fn a_sampler_that_knows_nothing_shows_the_picture() {
+        let mut session = white_session();
+        let unknown = Settings { overlay: Overlay::TileProbability, ..session.settings };
+        session.apply(Command::Settings(unknown));
+        assert_eq!(session.picture(Vec::new()).status.overlay, Some(Drawn::Unknown));
+        assert_eq!(brightness(&mut session), 255.0);
+    }
+
+    #[test]
+    fn throughput_and_ages_are_those_of_the_simulated_clock() {
+        let mut session = white_session();
+        session.picture(Vec::new());
+        run(&mut session, 1.0);
+        let status = session.picture(Vec::new()).status;
+        assert!((status.samples_per_sec / 100_000.0 - 1.0).abs() < 0.02, "{status:?}");
+        assert_eq!(status.ages.untraced, 0);
+        // A permutation visits each of 1,200 pixels every 12 ms, at most twice that from one pass to the next.
+        assert!((0.004..0.008).contains(&status.ages.mean_secs), "{status:?}");
+        assert!((0.008..0.026).contains(&status.ages.max_secs), "{status:?}");
+    }
+}

@@ -1,0 +1,121 @@
+//! What the user can set, apart from the camera and the time.
+
+use frameless::{SamplerKind, Size};
+
+/// Everything that may be set while the picture runs. No change of it clears the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Who chooses the pixels, with its parameters.
+    pub sampler: SamplerKind,
+    /// At most this many samples per second; `None`: as many as the renderer can.
+    pub samples_per_sec: Option<f64>,
+    /// Radiance is multiplied by 2^`exposure_stops` before display.
+    pub exposure_stops: f32,
+    /// What is shown instead of the picture.
+    pub overlay: Overlay,
+    /// How many pixels the picture has.
+    pub picture: PictureSize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings {
+            sampler: SamplerKind::CHANGE,
+            samples_per_sec: None,
+            exposure_stops: 0.0,
+            overlay: Overlay::None,
+            picture: PictureSize::default(),
+        }
+    }
+}
+
+/// What is shown instead of the picture, as a heat map.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Overlay {
+    /// The picture.
+    #[default]
+    None,
+    /// Change d when the pixel was traced last.
+    Change,
+    /// Seconds since the pixel was traced last.
+    Age,
+    /// Probability that the next draw falls into the pixel's tile.
+    TileProbability,
+    /// Samples per second.
+    SamplingRate,
+}
+
+impl Overlay {
+    /// All of them, in the order of the keys 0 to 4.
+    pub const ALL: [Overlay; 5] = [
+        Overlay::None,
+        Overlay::Change,
+        Overlay::Age,
+        Overlay::TileProbability,
+        Overlay::SamplingRate,
+    ];
+
+    /// As in the panel.
+    pub fn name(self) -> &'static str {
+        match self {
+            Overlay::None => "none",
+            Overlay::Change => "change",
+            Overlay::Age => "age",
+            Overlay::TileProbability => "tile probability",
+            Overlay::SamplingRate => "sampling rate",
+        }
+    }
+}
+
+/// How many pixels the picture has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PictureSize {
+    /// As many as its place in the window has, divided by the smallest whole number that keeps them below `at_most`.
+    Window {
+        /// Pixels; at least 1.
+        at_most: u32,
+    },
+    /// Always the same, drawn enlarged by a whole number, or reduced where the window is too small.
+    Fixed(Size),
+}
+
+impl Default for PictureSize {
+    /// The window, up to Full HD.
+    fn default() -> Self {
+        PictureSize::Window { at_most: 1920 * 1080 }
+    }
+}
+
+// A place in a window that is being shrunk may have no width; a picture needs at least one pixel.
+const SMALLEST_SIDE: u32 = 16;
+
+impl PictureSize {
+    /// The picture's size for a place of `place_px` physical pixels.
+    pub(crate) fn size_in(self, place_px: [u32; 2]) -> Size {
+        let [width, height] = place_px.map(|side| side.max(SMALLEST_SIDE));
+        match self {
+            PictureSize::Fixed(size) => size,
+            PictureSize::Window { at_most } => {
+                let too_many = f64::from(width) * f64::from(height) / f64::from(at_most.max(1));
+                let divisor = (too_many.sqrt().ceil() as u32).max(1);
+                Size::new((width / divisor).max(1), (height / divisor).max(1))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_picture_follows_the_window_up_to_the_limit() {
+        let window = PictureSize::Window { at_most: 500_000 };
+        assert_eq!(window.size_in([800, 600]), Size::new(800, 600));
+        assert_eq!(window.size_in([1000, 600]), Size::new(500, 300));
+        assert_eq!(window.size_in([3840, 2160]), Size::new(768, 432));
+        assert!(window.size_in([40_000, 40_000]).pixels() <= 500_000);
+        assert_eq!(window.size_in([0, 0]), Size::new(16, 16));
+        assert_eq!(PictureSize::Window { at_most: 0 }.size_in([100, 100]).pixels(), 1);
+    }
+}

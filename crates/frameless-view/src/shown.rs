@@ -1,0 +1,83 @@
+//! The canvas as the display wants it: 8 bits per channel, encoded once per sample and not once per refresh.
+
+use frameless::{Canvas, Display, Size, Time};
+
+/// The encoded picture, and which sample each of its pixels shows.
+pub(crate) struct Shown {
+    size: Size,
+    display: Display,
+    rgba: Vec<[u8; 4]>,
+    times: Vec<Time>,
+}
+
+/// How old the picture is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Ages {
+    /// Mean over the pixels that have been traced, in seconds.
+    pub(crate) mean_secs: f64,
+    /// The oldest of them, in seconds.
+    pub(crate) max_secs: f64,
+    /// Pixels that have never been traced.
+    pub(crate) untraced: usize,
+}
+
+impl Shown {
+    /// Encodes all of the canvas.
+    pub(crate) fn new(canvas: &Canvas, display: Display) -> Shown {
+        Shown {
+            size: canvas.size(),
+            display,
+            rgba: canvas.rgb().iter().map(|&rgb| display.encode_rgba8(rgb)).collect(),
+            times: canvas.time().to_vec(),
+        }
+    }
+
+    /// Encodes what is new: the pixels with another time than last time, or all after a change of size or display.
+    ///
+    /// A pixel's time can also fall behind the last call's: samples are as old as their batch.
+    pub(crate) fn update(&mut self, canvas: &Canvas, display: Display) {
+        if (self.size, self.display) != (canvas.size(), display) {
+            *self = Shown::new(canvas, display);
+            return;
+        }
+        let shown = self.rgba.iter_mut().zip(&mut self.times);
+        for ((rgba, shown), (&rgb, &time)) in shown.zip(canvas.rgb().iter().zip(canvas.time())) {
+            if *shown != time {
+                *shown = time;
+                *rgba = display.encode_rgba8(rgb);
+            }
+        }
+    }
+
+    /// Everything must be encoded again: pixels changed without a new sample (there and back to another size).
+    pub(crate) fn forget(&mut self) {
+        self.times.fill(Time(u64::MAX));
+    }
+
+    /// sRGB-encoded RGBA, row-major.
+    pub(crate) fn rgba(&self) -> &[[u8; 4]] {
+        &self.rgba
+    }
+}
+
+/// Mean and largest age of a canvas.
+pub(crate) fn ages(canvas: &Canvas, now: Time) -> Ages {
+    let mut traced = 0usize;
+    let mut sum_secs = 0.0;
+    let mut oldest = now;
+    // Row by row: a row's ages in nanoseconds fit an integer for 3 days, and sums of integers are fast.
+    for row in canvas.time().chunks(canvas.size().width as usize) {
+        let of_row = row.iter().filter(|&&time| time != Time::ZERO);
+        let (count, sum, min) = of_row.fold((0usize, 0u64, now), |(count, sum, min), &time| {
+            (count + 1, sum.saturating_add(now.0.saturating_sub(time.0)), min.min(time))
+        });
+        traced += count;
+        sum_secs += sum as f64 * 1e-9;
+        oldest = oldest.min(min);
+    }
+    Ages {
+        mean_secs: if traced > 0 { sum_secs / traced as f64 } else { 0.0 },
+        max_secs: now.secs_since(oldest),
+        untraced: canvas.time().len() - traced,
+    }
+}
