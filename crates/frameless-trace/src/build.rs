@@ -1,0 +1,155 @@
+//! From triangles to a wide BVH.
+
+use frameless_scene::Mesh;
+use glam::{Vec3, Vec3A};
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::leaf_collapser;
+use obvhs::bvh2::node::Bvh2Node;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::ploc::PlocBuilder;
+
+use crate::kernel::Pack;
+use crate::traverse::STACK_PER_TREE;
+use crate::wide::{Child, Node, collapse};
+
+/// A mesh's bottom-level BVH: triangles copied into packs of four, in the order of the leaves.
+#[derive(Debug)]
+pub(crate) struct Blas {
+    pub(crate) nodes: Vec<Node>,
+    pub(crate) packs: Vec<Pack>,
+    /// Of all triangles that can be hit; `None` if there are none.
+    pub(crate) bounds: Option<(Vec3A, Vec3A)>,
+}
+
+impl Blas {
+    /// Triangles with a vertex that is not finite, or so far away that squares overflow, are left out: the builder
+    /// panics on NaN. Triangles without area stay; no ray hits them.
+    pub(crate) fn new(mesh: &Mesh) -> Blas {
+        let (primitives, boxes): (Vec<u32>, Vec<Aabb>) = (0..mesh.triangles.len() as u32)
+            .filter_map(|primitive| Some((primitive, sane_box(&corners(mesh, primitive))?)))
+            .unzip();
+        let mut binary = binary_by_clustering(&boxes);
+        let mut blas = Blas { nodes: Vec::new(), packs: Vec::new(), bounds: union(&boxes) };
+        let needed = blas.take(&binary, mesh, &primitives);
+        if needed > STACK_PER_TREE {
+            binary = binary_by_median(&boxes);
+            blas.take(&binary, mesh, &primitives);
+        }
+        blas
+    }
+
+    fn take(&mut self, binary: &Bvh2, mesh: &Mesh, primitives: &[u32]) -> usize {
+        self.packs.clear();
+        let packs = &mut self.packs;
+        collapse(binary, &mut self.nodes, |members| {
+            let first = packs.len();
+            packs.extend(members.chunks(4).map(|four| pack(mesh, primitives, four)));
+            Child::leaf(first, packs.len() - first)
+        })
+    }
+}
+
+/// A triangle's vertices.
+pub(crate) fn corners(mesh: &Mesh, primitive: u32) -> [Vec3; 3] {
+    mesh.triangles[primitive as usize].map(|vertex| mesh.positions[vertex as usize])
+}
+
+fn sane_box(corners: &[Vec3; 3]) -> Option<Aabb> {
+    // Products of two coordinates, and of three in the builder's areas, must stay below 3.4e38.
+    const FARTHEST: f32 = 1e15;
+    let sane = corners.iter().all(|c| c.is_finite() && c.abs().max_element() < FARTHEST);
+    sane.then(|| Aabb::from_points(&corners.map(Vec3A::from)))
+}
+
+fn union(boxes: &[Aabb]) -> Option<(Vec3A, Vec3A)> {
+    boxes.iter().map(|b| (b.min, b.max)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+}
+
+fn pack(mesh: &Mesh, primitives: &[u32], members: &[u32]) -> Pack {
+    let mut pack = Pack { vertex: [[[0.0; 4]; 3]; 3], primitive: [0; 4] };
+    for lane in 0..4 {
+        let primitive = primitives[members[lane.min(members.len() - 1)] as usize];
+        pack.primitive[lane] = primitive;
+        for (corner, position) in corners(mesh, primitive).iter().enumerate() {
+            for axis in 0..3 {
+                pack.vertex[corner][axis][lane] = position[axis];
+            }
+        }
+    }
+    pack
+}
+
+/// Parallel locally-ordered clustering with reinsertion; `obvhs`' medium preset, step by step, since its helper
+/// validates the whole tree in debug builds.
+fn binary_by_clustering(boxes: &[Aabb]) -> Bvh2 {
+    if boxes.len() <= 4 {
+        return one_leaf(boxes);
+    }
+    let preset = BvhBuildParams::medium_build();
+    let mut binary = PlocBuilder::with_capacity(boxes.len()).build(
+        preset.ploc_search_distance,
+        boxes,
+        (0..boxes.len() as u32).collect(),
+        preset.sort_precision,
+        preset.search_depth_threshold,
+    );
+    let mut optimizer = ReinsertionOptimizer::default();
+    let ratio = preset.reinsertion_batch_ratio;
+    optimizer.run(&mut binary, ratio, None);
+    leaf_collapser::collapse(
+        &mut binary,
+        preset.max_prims_per_leaf,
+        preset.collapse_traversal_cost,
+    );
+    optimizer.run(
+        &mut binary,
+        ratio * preset.post_collapse_reinsertion_batch_ratio_multiplier,
+        None,
+    );
+    binary
+}
+
+fn one_leaf(boxes: &[Aabb]) -> Bvh2 {
+    let mut binary = Bvh2::zeroed(0);
+    if let Some((min, max)) = union(boxes) {
+        binary.nodes.push(Bvh2Node::new(Aabb::new(min, max), boxes.len() as u32, 0));
+        binary.primitive_indices = (0..boxes.len() as u32).collect();
+    }
+    binary
+}
+
+/// Halves the primitives by their centres along the longest axis: never deeper than log₂, for inputs on which
+/// clustering grows a tree that is too deep for the traversal's stack.
+pub(crate) fn binary_by_median(boxes: &[Aabb]) -> Bvh2 {
+    let mut binary = one_leaf(boxes);
+    let Bvh2 { nodes, primitive_indices, .. } = &mut binary;
+    let mut work: Vec<usize> = (0..nodes.len()).collect();
+    while let Some(at) = work.pop() {
+        let (first, count) = (nodes[at].first_index as usize, nodes[at].prim_count as usize);
+        if count <= 4 {
+            continue;
+        }
+        let members = &mut primitive_indices[first..first + count];
+        let diagonal = nodes[at].aabb().max - nodes[at].aabb().min;
+        let axis = (0..3).max_by(|&a, &b| diagonal[a].total_cmp(&diagonal[b])).unwrap_or(0);
+        let centre =
+            |&member: &u32| boxes[member as usize].min[axis] + boxes[member as usize].max[axis];
+        members.select_nth_unstable_by(count / 2, |a, b| {
+            centre(a).total_cmp(&centre(b)).then(a.cmp(b))
+        });
+        let child = |members: &[u32], first: usize| {
+            let bounds =
+                members.iter().fold(Aabb::INVALID, |sum, &m| sum.union(&boxes[m as usize]));
+            Bvh2Node::new(bounds, members.len() as u32, first as u32)
+        };
+        let (left, right) = members.split_at(count / 2);
+        let pair = [child(left, first), child(right, first + count / 2)];
+        let next = nodes.len();
+        nodes[at].make_inner(next as u32);
+        work.extend([next, next + 1]);
+        nodes.extend(pair);
+    }
+    binary
+}

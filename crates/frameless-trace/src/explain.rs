@@ -1,0 +1,45 @@
+//! One pixel in words.
+
+use frameless::{Request, Size};
+
+use crate::camera::{Camera, ViewSource};
+use crate::direct::{Probe, Settings};
+use crate::traverse::Stack;
+use crate::world::World;
+
+impl Probe for Vec<String> {
+    fn note(&mut self, line: impl FnOnce() -> String) {
+        self.push(line());
+    }
+}
+
+/// How a sample's colour comes about: the ray, what it hits at every bounce, the surface, each light with its visibility
+/// and contribution, and the colour, linear and sRGB. Traces with the very code that fills pictures.
+pub fn explain(
+    world: &World,
+    secs: f64,
+    view: &ViewSource,
+    size: Size,
+    request: &Request,
+    settings: &Settings,
+) -> Vec<String> {
+    let moment = world.moment(secs);
+    let view = view.at(world.scene(), moment.state());
+    let (x, y) = size.xy(request.pixel);
+    let mut lines = vec![format!(
+        "pixel ({x}, {y}) of {}×{}, offset {:?}, at {secs} s",
+        size.width, size.height, request.offset
+    )];
+    let ray = Camera::new(&view, size).ray(request);
+    let (rgb, surface) = world.radiance(&moment, ray, settings, &mut Stack::new(), &mut lines);
+    lines.push(format!("first surface: {surface:?}"));
+    lines.push(format!("linear RGB {rgb:?}, sRGB {:?}", rgb.map(srgb_byte)));
+    lines
+}
+
+/// sRGB encoding (IEC 61966-2-1) of a linear value, clamped to [0, 1], as a byte.
+fn srgb_byte(linear: f32) -> u8 {
+    let c = linear.clamp(0.0, 1.0);
+    let encoded = if c <= 0.0031308 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
+    (255.0 * encoded).round() as u8
+}

@@ -1,0 +1,87 @@
+//! The world at one time.
+
+use frameless_scene::{Geometry, State};
+
+use crate::lights::{LightNow, lights_now};
+use crate::top::{Placed, Shape, Targets, Top};
+use crate::world::World;
+
+/// A [`World`] at one time: where everything is, how bright the lights are, and the top-level BVH. Its memory can be used
+/// again for another time, see [`World::update_moment`].
+pub struct Moment {
+    /// Which world and what time it shows; `None` before the first update.
+    shows: Option<(u64, f64)>,
+    state: State,
+    placed: Vec<Placed>,
+    top: Top,
+    pub(crate) lights: Vec<LightNow>,
+}
+
+impl Moment {
+    /// The scene's state that this moment shows.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    pub(crate) fn placed(&self, instance: u32) -> &Placed {
+        &self.placed[instance as usize]
+    }
+
+    pub(crate) fn targets<'a>(&'a self, world: &'a World) -> Targets<'a> {
+        Targets { top: &self.top, placed: &self.placed, blas: &world.blas, isa: world.isa }
+    }
+}
+
+impl World {
+    /// The world at `secs` of scene time.
+    pub fn moment(&self, secs: f64) -> Moment {
+        let mut moment = Moment {
+            shows: None,
+            state: State::default(),
+            placed: Vec::new(),
+            top: Top::new(),
+            lights: Vec::new(),
+        };
+        self.update_moment(secs, &mut moment);
+        moment
+    }
+
+    /// Make `moment`, of this or any other world, show this world at `secs`. Does nothing if it does so already, and leaves
+    /// the top-level BVH alone if no instance has moved.
+    pub fn update_moment(&self, secs: f64, moment: &mut Moment) {
+        if moment.shows == Some((self.id, secs)) {
+            return;
+        }
+        let same_world = moment.shows.is_some_and(|(world, _)| world == self.id);
+        self.scene().update_state(secs, &mut moment.state);
+        lights_now(self.scene(), &moment.state, &mut moment.lights);
+        if !same_world {
+            moment.placed.clear();
+        }
+        if self.place_instances(moment) || !same_world {
+            moment.top.rebuild(&moment.placed, &self.blas);
+        }
+        moment.shows = Some((self.id, secs));
+    }
+
+    /// Whether any instance has moved.
+    fn place_instances(&self, moment: &mut Moment) -> bool {
+        let mut moved = false;
+        for (index, instance) in self.scene().instances.iter().enumerate() {
+            let world_from_object = moment.state.world_from_node[instance.node as usize];
+            match moment.placed.get_mut(index) {
+                Some(placed) if placed.world_from_object == world_from_object => continue,
+                Some(placed) => *placed = Placed::new(world_from_object, placed.shape),
+                None => {
+                    let shape = match self.scene().geometries[instance.geometry as usize] {
+                        Geometry::Mesh(_) => Shape::Mesh(instance.geometry),
+                        Geometry::Sphere { .. } => Shape::Sphere,
+                    };
+                    moment.placed.push(Placed::new(world_from_object, shape));
+                }
+            }
+            moved = true;
+        }
+        moved
+    }
+}
