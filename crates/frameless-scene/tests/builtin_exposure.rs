@@ -7,8 +7,8 @@ use frameless_scene::{
 };
 use glam::{Affine3A, Vec2, Vec3};
 
-const WIDTH: usize = 256;
-const HEIGHT: usize = 192;
+const WIDTH: usize = 128;
+const HEIGHT: usize = 96;
 const SECS: [f64; 3] = [0.5, 1.3, 2.2];
 /// Leaves a surface before its shadow and reflection rays start, in metres.
 const SURFACE_GAP: f32 = 2e-3;

@@ -19,6 +19,11 @@ impl Builder {
         Builder { scene }
     }
 
+    /// After which the scene begins again.
+    pub(super) fn duration_secs(&self) -> f64 {
+        self.scene.animation.duration_secs
+    }
+
     pub(super) fn finish(self) -> Scene {
         self.scene
     }

@@ -34,13 +34,14 @@ pub(super) fn sphere() -> Scene {
 pub(super) fn many() -> Scene {
     let mut builder = Builder::new("many", 8.0);
     let world = World::build(&mut builder);
-    movers(&mut builder, &world, 40, 8.0);
+    movers(&mut builder, &world, 40, 0.85);
     builder.finish()
 }
 
 pub(super) fn orbit() -> Scene {
     let mut builder = Builder::new("orbit", ORBIT_SECS);
     let world = World::build(&mut builder);
+    world.fill_front(&mut builder);
     orbit_and_pan(&mut builder, &world);
     builder.finish()
 }
@@ -54,6 +55,7 @@ pub(super) fn stopgo() -> Scene {
     let duration_secs = STEP_SECS * f64::from(STEPS);
     let mut builder = Builder::new("stopgo", duration_secs);
     let world = World::build(&mut builder);
+    world.fill_front(&mut builder);
     // Number of steps done at a time, and steps per second: smoothstep while moving, then rest.
     let steps = |secs: f64| {
         // The keys are multiples of 1/16 of a step, up to rounding.
@@ -108,13 +110,12 @@ pub(super) fn shadow() -> Scene {
     builder.animate(circling_light(&world, DURATION_SECS, 1));
     let mirror = builder.mirror(REFLECTANCE);
     builder.sphere("mirror ball", mirror, Vec3::new(0.5, 1.25, 2.6), 1.25);
-    let panel = (Vec3::new(-3.3, 1.8, 0.6), Vec3::new(1.1, 1.7, 0.04), 0.36);
-    builder.block("mirror", mirror, panel, 1.0);
+    framed_mirror(&mut builder, mirror);
     let texture = ball(6, [Vec3::new(0.85, 0.2, 0.2), Vec3::new(0.9, 0.85, 0.8), Vec3::ZERO]);
     let material = builder.matte(texture);
     let behind = Vec3::new(0.0, 1.9, CAMERA_DISTANCE + 1.5);
     let node = builder.sphere("behind the camera", material, behind, 0.8);
-    let reach = DVec3::new(2.8, 0.5, 0.4);
+    let reach = DVec3::new(1.9, 0.5, 0.4);
     let mover = Lissajous { centre: behind.as_dvec3(), reach, cycles: 2, phase: 0.0 };
     builder.animate(mover.channel(node, DURATION_SECS));
     builder.animate(spin(node, DURATION_SECS, Vec3::Y, 3));
@@ -151,8 +152,24 @@ pub(super) fn mix() -> Scene {
     for channel in sphere.through(&to_and_fro(7)) {
         builder.animate(channel);
     }
-    movers(&mut builder, &world, 10, ORBIT_SECS);
+    // Above the sphere.
+    movers(&mut builder, &world, 10, 3.1);
     builder.finish()
+}
+
+/// A standing mirror on the left, turned so that the camera sees in it what is behind itself.
+fn framed_mirror(builder: &mut Builder, mirror: u32) {
+    const YAW_RAD: f32 = 0.42;
+    const HALF: Vec3 = Vec3::new(1.0, 1.6, 0.03);
+    const FRAME: Vec3 = Vec3::new(0.12, 0.12, 0.0);
+    let centre = Vec3::new(-2.9, 1.75, 2.4);
+    let ahead = Quat::from_rotation_y(YAW_RAD) * Vec3::Z;
+    builder.block("mirror", mirror, (centre, HALF, YAW_RAD), 1.0);
+    let (a, b) = (Vec3::new(0.85, 0.66, 0.28), Vec3::new(0.42, 0.26, 0.14));
+    let wood = builder.matte(checker([8, 8], a, b));
+    // A little behind the glass, so that no two faces lie in one plane.
+    let behind = (centre - 0.02 * ahead, HALF + FRAME, YAW_RAD);
+    builder.block("mirror's frame", wood, behind, 1.2);
 }
 
 /// The sketch's sphere, between two blocks from which it bounces.
@@ -175,7 +192,8 @@ fn rolling_sphere(builder: &mut Builder) -> Rolling {
 
 /// Stops of the sphere that crosses `2 · rounds` times, from the left.
 fn to_and_fro(rounds: u32) -> Vec<(f64, f64)> {
-    let side = |crossing: u32| if crossing % 2 == 0 { -SPHERE_REACH } else { SPHERE_REACH };
+    let side =
+        |crossing: u32| if crossing.is_multiple_of(2) { -SPHERE_REACH } else { SPHERE_REACH };
     (0..=2 * rounds).map(|i| (SPHERE_CROSSING_SECS * f64::from(i), side(i))).collect()
 }
 
@@ -224,13 +242,19 @@ impl Lissajous {
     }
 }
 
-/// Small spheres and boxes that fly figures of eight at 1.5 to 4.5 m/s and spin.
-fn movers(builder: &mut Builder, world: &World, count: u32, duration_secs: f64) {
+/// Small spheres and boxes that fly figures of eight at 1.5 to 4.5 m/s and spin, `lowest` or more above the
+/// floor on average.
+fn movers(builder: &mut Builder, world: &World, count: u32, lowest: f32) {
+    let duration_secs = builder.duration_secs();
     for i in 0..count {
         let random = |what: u32, low: f32, high: f32| low + (high - low) * hash(i, what, 40);
         let reach = f64::from(random(0, 0.5, 1.4));
         let size = random(1, 0.15, 0.27);
-        let centre = Vec3::new(random(2, -3.6, 3.6), random(3, 0.85, 3.4), random(4, -1.0, 4.2));
+        let centre = Vec3::new(
+            random(2, -3.2, 3.2),
+            lowest + random(3, 0.0, 1.0) * (3.9 - lowest),
+            random(4, 0.4, 4.0),
+        );
         let tint = Vec3::new(random(5, 0.5, 1.0), random(6, 0.5, 1.0), random(7, 0.5, 1.0));
         let material = world.materials[i as usize % world.materials.len()];
         let material = builder.tinted(material, tint);

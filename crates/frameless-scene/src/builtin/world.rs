@@ -45,6 +45,23 @@ impl World {
         furniture(builder, &materials);
         World { orbit, pan, light, materials }
     }
+
+    /// More furniture in the front of the court, where nothing moves.
+    pub(super) fn fill_front(&self, builder: &mut Builder) {
+        /// Numbers of pieces that [`furniture`] has not used, with x and z of where they stand.
+        const PIECES: [(u32, f32, f32); 7] = [
+            (17, -1.2, 2.3),
+            (18, 1.5, 2.9),
+            (19, 4.2, 2.2),
+            (20, -3.8, 2.9),
+            (21, -2.3, 4.6),
+            (22, 0.1, 4.3),
+            (23, 3.1, 4.6),
+        ];
+        for (i, x, z) in PIECES {
+            piece(builder, &self.materials, i, Vec3::new(x, 0.0, z));
+        }
+    }
 }
 
 /// A camera on a rig: orbit → pan → camera.
@@ -106,22 +123,24 @@ fn furniture(builder: &mut Builder, materials: &[u32]) {
     const MIDDLE: Vec3 = Vec3::new(0.0, 0.0, -2.0);
     let golden_angle = TAU * (1.0 - 2.0 / (1.0 + 5f32.sqrt()));
     for i in 0..COUNT {
-        let random = |what| hash(i, what, 77);
         let radius = ((i as f32 + 0.5) / COUNT as f32).sqrt();
         let (sin, cos) = (golden_angle * i as f32).sin_cos();
         let place = MIDDLE + Vec3::new(6.2 * radius * cos, 0.0, 3.1 * radius * sin);
-        let material = materials[i as usize % materials.len()];
-        if i % 2 == 0 {
-            let half = Vec3::new(
-                0.35 + 0.25 * random(0),
-                0.55 + 0.75 * random(1),
-                0.35 + 0.25 * random(2),
-            );
-            let block = (place + Vec3::Y * half.y, half, 3.0 * random(3));
-            builder.block("block", material, block, 1.6);
-        } else {
-            let radius = 0.45 + 0.3 * random(4);
-            builder.sphere("ball", material, place + Vec3::Y * radius, radius);
-        }
+        piece(builder, materials, i, place);
+    }
+}
+
+/// Piece number `i` of the furniture: a block or a sphere of random size that stands on `place`.
+fn piece(builder: &mut Builder, materials: &[u32], i: u32, place: Vec3) {
+    let random = |what| hash(i, what, 77);
+    let material = materials[i as usize % materials.len()];
+    if i.is_multiple_of(2) {
+        let half =
+            Vec3::new(0.35 + 0.25 * random(0), 0.55 + 0.75 * random(1), 0.35 + 0.25 * random(2));
+        let block = (place + Vec3::Y * half.y, half, 3.0 * random(3));
+        builder.block("block", material, block, 1.6);
+    } else {
+        let radius = 0.45 + 0.3 * random(4);
+        builder.sphere("ball", material, place + Vec3::Y * radius, radius);
     }
 }
