@@ -103,7 +103,7 @@ impl World {
             if throughput == Vec3A::ZERO {
                 break;
             }
-            ray = Ray { origin: point.position, direction: reflect(ray.direction, &point) };
+            ray = Ray { origin: point.outside, direction: reflect(ray.direction, &point) };
         }
         (finite(radiance), first.unwrap_or_else(|| sky_surface(&ray)))
     }

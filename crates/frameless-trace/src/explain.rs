@@ -1,6 +1,6 @@
 //! One pixel in words.
 
-use frameless::{Request, Size};
+use frameless::{Display, Request, Size};
 
 use crate::camera::{Camera, ViewSource};
 use crate::direct::{Probe, Settings};
@@ -33,13 +33,7 @@ pub fn explain(
     let ray = Camera::new(&view, size).ray(request);
     let (rgb, surface) = world.radiance(&moment, ray, settings, &mut Stack::new(), &mut lines);
     lines.push(format!("first surface: {surface:?}"));
-    lines.push(format!("linear RGB {rgb:?}, sRGB {:?}", rgb.map(srgb_byte)));
+    let [r, g, b, _] = Display::new(0.0).encode_rgba8(rgb);
+    lines.push(format!("linear RGB {rgb:?}, sRGB at exposure 0: {:?}", [r, g, b]));
     lines
-}
-
-/// sRGB encoding (IEC 61966-2-1) of a linear value, clamped to [0, 1], as a byte.
-fn srgb_byte(linear: f32) -> u8 {
-    let c = linear.clamp(0.0, 1.0);
-    let encoded = if c <= 0.0031308 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
-    (255.0 * encoded).round() as u8
 }

@@ -27,6 +27,8 @@ mod world;
 #[cfg(test)]
 mod reference;
 #[cfg(test)]
+mod shading;
+#[cfg(test)]
 mod test_scenes;
 
 pub use camera::ViewSource;

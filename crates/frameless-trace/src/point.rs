@@ -14,9 +14,11 @@ use crate::world::World;
 /// A point on a surface, seen from one side: both normals are on the side of the ray.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Point {
-    /// World coordinates, outside the surface by a little more than the rounding errors, on the ray's side.
+    /// World coordinates.
     pub(crate) position: Vec3A,
-    /// Where shadow rays begin: as `position`, but on the smooth surface that the shading normals describe.
+    /// Where the mirrored ray begins: on the ray's side, outside the surface by a little more than rounding errors.
+    pub(crate) outside: Vec3A,
+    /// Where shadow rays begin: as `outside`, but off the smooth surface that the shading normals describe.
     pub(crate) shadow_origin: Vec3A,
     /// Unit normal of the triangle, world coordinates.
     pub(crate) geometric_normal: Vec3A,
@@ -181,8 +183,10 @@ fn into_world(ray: &Ray, placed: &Placed, local: &Local, base: Vec3A) -> Point {
     }
     let extent = m.matrix3.abs() * local.extent + m.translation.abs();
     let outwards = geometric_normal * (OFFSET * extent.max_element());
+    let position = m.transform_point3a(local.position);
     Point {
-        position: m.transform_point3a(local.position) + outwards,
+        position,
+        outside: position + outwards,
         shadow_origin: m.transform_point3a(local.shadow_origin) + outwards,
         geometric_normal,
         normal,
