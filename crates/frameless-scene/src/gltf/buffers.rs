@@ -26,9 +26,11 @@ pub(super) fn load_buffers<'a>(
     warnings: &mut Warnings,
 ) -> Result<Vec<Cow<'a, [u8]>>, Fault> {
     let list = root.list("buffers")?;
-    let first_has_uri =
-        list.first().map_or(Ok(true), |first| first.field("uri").map(|uri| uri.is_some()))?;
-    if bin.is_some() && first_has_uri {
+    let first_uses_bin = match list.first() {
+        Some(first) => first.field("uri")?.is_none(),
+        None => false,
+    };
+    if bin.is_some() && !first_uses_bin {
         warnings.add("the binary chunk of the GLB is used by no buffer");
     }
     let mut buffers = Vec::new();

@@ -1,0 +1,8 @@
+//! glTF files made by hand: what has to come out of them is known to the byte.
+
+mod hostile;
+mod maker;
+mod meshes;
+mod motion;
+mod nodes;
+mod surfaces;

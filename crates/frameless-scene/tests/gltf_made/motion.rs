@@ -1,0 +1,146 @@
+//! Keyframe animation.
+
+use frameless_scene::{Interpolation, Target, Values};
+use glam::{Quat, Vec3};
+use serde_json::{Value, json};
+
+use super::maker::Maker;
+
+/// A document with one node that is moved along `path` by the given keys.
+fn moved(path: &str, interpolation: &str, times: &[f32], values: &[f32]) -> Maker {
+    let mut maker = Maker::new();
+    maker.push("nodes", json!({}));
+    add_animation(&mut maker, path, interpolation, times, values);
+    maker
+}
+
+fn add_animation(
+    maker: &mut Maker,
+    path: &str,
+    interpolation: &str,
+    times: &[f32],
+    values: &[f32],
+) {
+    let input = maker.floats("SCALAR", times);
+    let output = maker.floats(if path == "rotation" { "VEC4" } else { "VEC3" }, values);
+    let animation: Value = json!({"name": "an animation",
+        "channels": [{"sampler": 0, "target": {"node": 0, "path": path}}],
+        "samplers": [{"input": input, "output": output, "interpolation": interpolation}]});
+    maker.push("animations", animation);
+}
+
+/// Where node 0 is at `secs`.
+fn place(maker: &Maker, secs: f64) -> Vec3 {
+    maker.load().state_at(secs).world_from_node[0].translation.into()
+}
+
+#[test]
+fn steps_and_lines_between_keys() {
+    let values = [0.0, 0.0, 0.0, 4.0, 0.0, 0.0];
+    let line = moved("translation", "LINEAR", &[0.0, 2.0], &values);
+    assert_eq!(line.load().animation.duration_secs, 2.0);
+    assert_eq!(place(&line, 0.5), Vec3::X);
+    let step = moved("translation", "STEP", &[0.0, 2.0], &values);
+    assert_eq!(place(&step, 1.5), Vec3::ZERO);
+}
+
+/// Appendix C: halfway between values 0 and 1 with tangents 0 is 1/2; an out-tangent of 8 adds t_d · 8 / 8.
+#[test]
+fn cubic_splines_have_three_values_per_key() {
+    let key = |x: f32, out: f32| [[0.0; 3], [x, 0.0, 0.0], [out, 0.0, 0.0]].concat();
+    let values = [key(0.0, 8.0), key(1.0, 0.0)].concat();
+    let spline = moved("translation", "CUBICSPLINE", &[0.0, 2.0], &values);
+    assert_eq!(place(&spline, 1.0), Vec3::X * (0.5 + 2.0 * 8.0 / 8.0));
+    let scene = spline.load();
+    let Values::Vec3(values) = &scene.animation.channels[0].values else { panic!("positions") };
+    assert_eq!((values.len(), values[2]), (6, Vec3::X * 8.0));
+}
+
+/// Tangents keep their length; the value between them is brought to one.
+#[test]
+fn spline_rotations_are_normalised_but_not_their_tangents() {
+    let key = [[3.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 2.0], [0.0, 5.0, 0.0, 0.0]].concat();
+    let scene = moved("rotation", "CUBICSPLINE", &[1.0], &key).load();
+    let Values::Quat(values) = &scene.animation.channels[0].values else { panic!("rotations") };
+    let expected = [Quat::from_xyzw(3.0, 0.0, 0.0, 0.0), Quat::IDENTITY];
+    assert_eq!(values[..2], expected);
+    assert_eq!(values[2].y, 5.0);
+}
+
+#[test]
+fn rotations_may_be_normalised_shorts() {
+    let mut maker = moved("rotation", "LINEAR", &[1.0], &[0.0; 4]);
+    let bytes = [0_i16, 32767, 0, 0].map(i16::to_le_bytes).concat();
+    let output = maker.accessor(5122, "VEC4", 1, &bytes);
+    maker.json["accessors"][output]["normalized"] = json!(true);
+    maker.json["animations"][0]["samplers"][0]["output"] = json!(output);
+    let scene = maker.load();
+    let Values::Quat(values) = &scene.animation.channels[0].values else { panic!("rotations") };
+    assert_eq!(values[..], [Quat::from_xyzw(0.0, 1.0, 0.0, 0.0)]);
+}
+
+#[test]
+fn unusable_keys_are_left_out_aloud() {
+    let times = [0.0, -1.0, 1.0, 1.0, 0.5, f32::NAN, 3.0, 4.0, f32::INFINITY];
+    let mut values: Vec<f32> = (0..times.len()).flat_map(|key| [key as f32; 3]).collect();
+    values[3 * 7] = f32::NAN;
+    let scene = moved("scale", "LINEAR", &times, &values).load();
+    let channel = &scene.animation.channels[0];
+    assert_eq!(channel.times, [0.0, 1.0, 3.0]);
+    let Values::Vec3(values) = &channel.values else { panic!("scales") };
+    assert_eq!(values[..], [Vec3::ZERO, Vec3::splat(2.0), Vec3::splat(6.0)]);
+    assert!(scene.warnings[0].contains("\"an animation\""), "{:?}", scene.warnings);
+}
+
+#[test]
+fn values_that_do_not_match_the_keys_are_refused() {
+    for (interpolation, values) in [("LINEAR", 3), ("STEP", 1), ("CUBICSPLINE", 2)] {
+        let maker = moved("scale", interpolation, &[0.0, 1.0], &vec![1.0; 3 * values]);
+        let refusal = maker.refusal();
+        assert!(refusal.contains("/animations/0/channels/0/sampler: wanted"), "{refusal}");
+    }
+    let mut maker = moved("scale", "LINEAR", &[0.0], &[1.0; 3]);
+    maker.json["animations"][0]["channels"][0]["target"]["path"] = json!("rotation");
+    assert!(maker.refusal().contains("/accessors/1: wanted 4 components"), "{}", maker.refusal());
+}
+
+#[test]
+fn animations_are_merged_and_the_first_wins() {
+    let mut maker = moved("translation", "LINEAR", &[0.0, 1.0], &[0.0; 6]);
+    add_animation(&mut maker, "translation", "LINEAR", &[0.0, 9.0], &[5.0; 6]);
+    add_animation(&mut maker, "scale", "LINEAR", &[0.0, 3.0], &[1.0; 6]);
+    let scene = maker.load();
+    let targets: Vec<_> = scene.animation.channels.iter().map(|channel| channel.target).collect();
+    assert_eq!(targets, [Target::Translation(0), Target::Scale(0)]);
+    assert_eq!(scene.animation.duration_secs, 3.0, "that of what is played");
+    assert!(scene.warnings[0].contains("earlier animation"), "{:?}", scene.warnings);
+    assert_eq!(scene.animation.channels[0].interpolation, Interpolation::Linear);
+}
+
+#[test]
+fn a_key_at_time_zero_alone_is_a_pose() {
+    let maker = moved("translation", "LINEAR", &[0.0], &[1.0, 2.0, 3.0]);
+    assert_eq!(place(&maker, 0.0), Vec3::new(1.0, 2.0, 3.0));
+    assert!(maker.load().animation.channels.is_empty());
+}
+
+#[test]
+fn nodes_outside_the_scene_are_not_moved() {
+    let mut maker = moved("translation", "LINEAR", &[0.0, 1.0], &[0.0; 6]);
+    maker.push("nodes", json!({"name": "shown"}));
+    maker.push("scenes", json!({"nodes": [1]}));
+    let scene = maker.load();
+    assert!(scene.animation.channels.is_empty());
+    assert_eq!(scene.nodes[0].name, "shown");
+}
+
+#[test]
+fn weights_and_pointers_are_left_out_aloud() {
+    for path in ["weights", "pointer"] {
+        let mut maker = moved("translation", "LINEAR", &[0.0], &[0.0; 3]);
+        maker.json["animations"][0]["channels"][0]["target"] = json!({"path": path});
+        let scene = maker.load();
+        assert!(scene.animation.channels.is_empty());
+        assert!(scene.warnings[0].contains(path), "{:?}", scene.warnings);
+    }
+}

@@ -1,0 +1,188 @@
+//! The transform hierarchy, scenes, cameras and lights.
+
+use frameless_scene::{LightKind, Limits, Projection, Transform, load_scene};
+use glam::{Mat4, Quat, Vec3};
+use serde_json::json;
+
+use super::maker::{Maker, SQUARE};
+
+/// The rest pose of a single node with this matrix, and the warnings.
+fn load_matrix(matrix: Mat4) -> (Transform, Vec<String>) {
+    let mut maker = Maker::new();
+    maker.push("nodes", json!({"matrix": matrix.to_cols_array()}));
+    let scene = maker.load();
+    (scene.nodes[0].rest, scene.warnings)
+}
+
+#[test]
+fn matrices_become_translation_rotation_and_scale() {
+    let rotation = Quat::from_euler(glam::EulerRot::XYZ, 0.3, -1.1, 2.0);
+    let translation = Vec3::new(1.0, -2.0, 3.0);
+    for scale in [
+        Vec3::ONE,
+        Vec3::new(2.0, 0.5, 3.0),
+        Vec3::new(-1.0, 1.0, 1.0),
+        Vec3::new(1.0, -2.0, 3.0),
+        Vec3::new(-1.0, -1.0, -1.0),
+        Vec3::new(1e-12, 1e-12, 1e-12),
+        Vec3::new(1e15, 1e12, 1e15),
+        Vec3::new(0.0, 1.0, 2.0),
+        Vec3::new(1.0, 0.0, 2.0),
+        Vec3::new(0.0, 0.0, 2.0),
+        Vec3::new(2.0, 0.0, 0.0),
+        Vec3::ZERO,
+    ] {
+        let matrix = Mat4::from_scale_rotation_translation(scale, rotation, translation);
+        let (rest, warnings) = load_matrix(matrix);
+        let error = (Mat4::from(rest.affine()) - matrix).to_cols_array();
+        let error = error.into_iter().fold(0.0_f32, |error, x| error.max(x.abs()));
+        assert!(error <= 1e-5 * scale.abs().max_element(), "{scale}: off by {error}");
+        assert!((rest.rotation.length() - 1.0).abs() < 1e-5, "{scale}");
+        assert_eq!(warnings, ["the file has nothing to draw"], "{scale}");
+    }
+}
+
+#[test]
+fn sheared_matrices_lose_their_shear_aloud() {
+    let mut shear = Mat4::IDENTITY;
+    shear.y_axis.x = 0.5;
+    let (_, warnings) = load_matrix(shear);
+    assert!(warnings[0].contains("sheared"), "{warnings:?}");
+}
+
+#[test]
+fn rotations_get_length_one() {
+    for (rotation, expected) in [
+        ([0.0, 2.0, 0.0, 0.0], Quat::from_xyzw(0.0, 1.0, 0.0, 0.0)),
+        ([0.0, 0.0, 1e-30, 0.0], Quat::IDENTITY),
+        ([0.0, 0.0, 0.0, 3e38], Quat::IDENTITY),
+        ([0.0; 4], Quat::IDENTITY),
+    ] {
+        let mut maker = Maker::new();
+        maker.push("nodes", json!({"rotation": rotation}));
+        assert_eq!(maker.load().nodes[0].rest.rotation, expected, "{rotation:?}");
+    }
+}
+
+#[test]
+fn children_come_after_their_parents() {
+    let mut maker = Maker::new();
+    maker.json["nodes"] = json!([{"name": "leaf"}, {"name": "branch", "children": [0]},
+        {"name": "root", "children": [1, 3]}, {"name": "other leaf"}]);
+    let scene = maker.load();
+    let nodes: Vec<_> = scene.nodes.iter().map(|node| (node.name.as_str(), node.parent)).collect();
+    let expected =
+        [("root", None), ("branch", Some(0)), ("other leaf", Some(0)), ("leaf", Some(1))];
+    assert_eq!(nodes[..4], expected);
+}
+
+#[test]
+fn loops_and_two_parents_are_refused() {
+    for (nodes, place) in [
+        (json!([{"children": [0]}]), "/nodes/0"),
+        (json!([{}, {"children": [2]}, {"children": [1]}]), "/nodes/1"),
+        (json!([{"children": [2]}, {"children": [2]}, {}]), "/nodes/1/children/0"),
+        (json!([{"children": [1, 1]}, {}]), "/nodes/0/children/1"),
+    ] {
+        let mut maker = Maker::new();
+        maker.json["nodes"] = nodes;
+        assert!(
+            maker.refusal().starts_with(&format!("made.glb: {place}: ")),
+            "{}",
+            maker.refusal()
+        );
+    }
+}
+
+#[test]
+fn the_default_scene_is_shown_unless_another_is_asked_for() {
+    let mut maker = Maker::with_primitive(
+        |maker| json!({"attributes": {"POSITION": maker.floats("VEC3", &SQUARE)}}),
+    );
+    maker.json["nodes"] =
+        json!([{"mesh": 0, "name": "a"}, {"mesh": 0, "name": "b"}, {"name": "c"}]);
+    maker.json["scenes"] = json!([{"nodes": [0, 2]}, {"nodes": [1]}]);
+    assert_eq!(maker.load().nodes[0].name, "a", "the first, as there is no default");
+    maker.json["scene"] = json!(1);
+    let scene = maker.load();
+    assert_eq!(scene.nodes[0].name, "b");
+    assert_eq!(scene.instances.len(), 1);
+    assert!(scene.warnings[0].contains("2 scenes"), "{:?}", scene.warnings);
+    let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("scenes.glb");
+    std::fs::write(&path, maker.glb()).unwrap();
+    let first = load_scene(&path, Some(0), &Limits::default()).unwrap();
+    assert_eq!(first.nodes[0].name, "a");
+    let error = load_scene(&path, Some(2), &Limits::default()).unwrap_err().to_string();
+    assert!(error.ends_with("/scenes: wanted scene 2, as was asked for, got 2 scenes"), "{error}");
+    maker.json["scene"] = json!(2);
+    assert!(maker.refusal().contains("/scene: "));
+}
+
+#[test]
+fn without_scenes_all_nodes_are_shown() {
+    let mut maker = Maker::new();
+    maker.json["nodes"] = json!([{"name": "a"}, {"name": "b"}]);
+    assert_eq!(maker.load().nodes[1].name, "b");
+}
+
+#[test]
+fn cameras_and_lights_stand_at_their_nodes() {
+    let mut maker = Maker::new();
+    maker.json["cameras"] = json!([{"type": "perspective", "perspective": {"yfov": 0.5, "znear": 1}},
+        {"name": "flat", "type": "orthographic", "orthographic": {"ymag": -2.0}}]);
+    maker.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [
+        {"type": "point", "color": [1.0, 0.5, 0.0], "intensity": 4.0},
+        {"type": "directional"},
+        {"type": "spot", "range": 3.0, "spot": {"innerConeAngle": 0.5, "outerConeAngle": 0.5}}]}});
+    let light = |light: u32| json!({"KHR_lights_punctual": {"light": light}});
+    maker.json["nodes"] = json!([{"camera": 1}, {"camera": 0, "name": "eye", "extensions": light(0)},
+        {"extensions": light(1)}, {"extensions": light(2)}]);
+    let scene = maker.load();
+    assert_eq!(scene.notes, [""; 0]);
+    assert_eq!(scene.cameras[0].projection, Projection::Orthographic { ymag: 2.0 });
+    assert_eq!((scene.cameras[0].name.as_str(), scene.cameras[0].node), ("flat", 0));
+    assert_eq!(scene.cameras[1].projection, Projection::Perspective { yfov_rad: 0.5 });
+    assert_eq!((scene.cameras[1].name.as_str(), scene.cameras[1].node), ("eye", 1));
+    assert_eq!(scene.lights[0].intensity, Vec3::new(4.0, 2.0, 0.0));
+    assert_eq!((scene.lights[0].kind, scene.lights[0].node), (LightKind::Point, 1));
+    assert_eq!(scene.lights[0].range, f32::INFINITY);
+    assert_eq!(
+        (scene.lights[1].kind, scene.lights[1].intensity),
+        (LightKind::Directional, Vec3::ONE)
+    );
+    let LightKind::Spot { cos_inner, cos_outer } = scene.lights[2].kind else { panic!("a spot") };
+    assert!(cos_outer < cos_inner && (cos_outer - 0.5_f32.cos()).abs() < 1e-6);
+    assert_eq!(scene.ambient, Vec3::ZERO);
+}
+
+/// Seen from the added camera, every corner lies inside a square picture's height.
+#[test]
+fn the_added_camera_sees_everything() {
+    for (scale, place) in [(1.0, 0.0), (1e-2, 5.0), (1e4, -1e5)] {
+        let mut maker = Maker::with_primitive(
+            |maker| json!({"attributes": {"POSITION": maker.floats("VEC3", &SQUARE)}, "mode": 6}),
+        );
+        maker.json["nodes"][0]["scale"] = json!([scale, scale, scale]);
+        maker.json["nodes"][0]["translation"] = json!([place, place, place]);
+        let scene = maker.load();
+        let state = scene.state_at(0.0);
+        let camera_from_world = scene.view_at(&state, 0).world_from_camera.inverse();
+        let Projection::Perspective { yfov_rad } = scene.cameras[0].projection else {
+            panic!("the added camera is a perspective one")
+        };
+        for corner in SQUARE.chunks(3) {
+            let world = state.world_from_node[0].transform_point3(Vec3::from_slice(corner));
+            let seen = camera_from_world.transform_point3(world);
+            let slope = seen.x.hypot(seen.y) / -seen.z;
+            assert!(seen.z < 0.0 && slope <= (yfov_rad / 2.0).tan() * 1.01, "{scale}: {seen}");
+        }
+        assert!(scene.notes[0].contains("camera") && scene.notes[1].contains("light"));
+    }
+}
+
+#[test]
+fn an_empty_file_is_a_scene_that_says_so() {
+    let scene = Maker::new().load();
+    assert_eq!(scene.warnings, ["the file has nothing to draw"]);
+    assert_eq!(scene.cameras.len(), 1);
+}
