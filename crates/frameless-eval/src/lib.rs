@@ -1,1 +1,31 @@
-//! Placeholder.
+//! How good was it: any algorithm at any rate against the ideal instantaneous renderer.
+//!
+//! An [`Experiment`] (TOML) names scenes, algorithms, rates and seeds. [`compare`] traces the ideal pictures once per
+//! scene, runs every combination on the simulated clock, and writes numbers, curves, stills and videos.
+
+mod algorithm;
+mod camera_path;
+mod compare;
+mod error;
+mod experiment;
+mod ideal;
+mod metrics;
+mod output;
+mod results;
+mod run;
+mod subject;
+
+pub use algorithm::Algorithm;
+pub use camera_path::CameraPath;
+pub use experiment::{Experiment, IDEAL, SceneSource, SceneSpec};
+
+pub use subject::{Subject, SubjectTracer};
+
+pub use ideal::{Ideals, refresh_time};
+pub use run::{Cell, run};
+
+pub use metrics::{Picture, changed_region, mean, quantile, rmse, rmse_where};
+pub use results::{Mean, RESULTS_VERSION, Results, Rmse, RunResult};
+
+pub use compare::{Progress, compare};
+pub use error::EvalError;

@@ -45,8 +45,14 @@ impl Display {
     /// The same in 8 bits per channel, with alpha 255.
     #[inline]
     pub fn encode_rgba8(&self, rgb: [f32; 3]) -> [u8; 4] {
-        let [r, g, b] = self.encode(rgb).map(|c| (c * 255.0 + 0.5) as u8);
+        let [r, g, b] = self.encode(rgb).map(Display::quantize);
         [r, g, b, 255]
+    }
+
+    /// An encoded channel in [0, 1] to the nearest of 256 steps.
+    #[inline]
+    pub fn quantize(encoded: f32) -> u8 {
+        (encoded * 255.0 + 0.5) as u8
     }
 
     /// d = Σₖ (newₖ − oldₖ)² of two linear RGB radiances, over display-referred sRGB; in [0, 3].

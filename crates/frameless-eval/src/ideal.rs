@@ -1,0 +1,57 @@
+//! The hypothetical instantaneous renderer: the whole picture at exactly each refresh's time.
+
+use frameless::{Display, Time};
+use rayon::prelude::*;
+
+use crate::experiment::Experiment;
+use crate::metrics::{Picture, changed_region};
+use crate::subject::Subject;
+
+/// The ideal pictures of one scene.
+pub struct Ideals {
+    /// Linear RGB at time 0: every algorithm starts from it.
+    pub start: Vec<[f32; 3]>,
+    /// Display-referred sRGB at every refresh.
+    pub pictures: Vec<Picture>,
+    /// Per refresh: where the ideal has changed within [`CHANGED_WITHIN_SECS`].
+    pub changed: Vec<Vec<bool>>,
+}
+
+/// How long a change counts as recent, for the RMSE over the changed region.
+const CHANGED_WITHIN_SECS: f64 = 0.1;
+
+/// Time of refresh `k`.
+pub fn refresh_time(k: usize, display_hz: u32) -> Time {
+    Time(((k as u64 + 1) * 1_000_000_000).div_ceil(u64::from(display_hz)))
+}
+
+impl Ideals {
+    /// Traces them on all cores; `done` is called after each picture. `None` if `stop` said so.
+    pub fn trace(
+        subject: &Subject,
+        experiment: &Experiment,
+        done: &(dyn Fn() + Sync),
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Ideals> {
+        let size = experiment.size;
+        let display = Display::default();
+        let trace = |k: usize| {
+            if stop() {
+                return None;
+            }
+            let secs = refresh_time(k, experiment.display_hz).secs();
+            let linear = subject.ideal(secs, size);
+            done();
+            Some(linear.into_iter().map(|rgb| display.encode(rgb)).collect())
+        };
+        let pictures: Vec<Picture> =
+            (0..experiment.refreshes).into_par_iter().map(trace).collect::<Option<_>>()?;
+        let within = (CHANGED_WITHIN_SECS * f64::from(experiment.display_hz)).round() as usize;
+        let changed = (0..pictures.len()).into_par_iter().map(|k| {
+            let recent = pictures[k.saturating_sub(within)..k].iter().map(|p| &p[..]);
+            changed_region(recent, &pictures[k])
+        });
+        let changed = changed.collect();
+        Some(Ideals { start: subject.ideal(0.0, size), changed, pictures })
+    }
+}

@@ -1,0 +1,80 @@
+//! One run: one scene, one algorithm, one rate, one seed, against the ideal at every refresh.
+
+use frameless::{Canvas, Clock, Display, Engine, EngineError};
+
+use crate::algorithm::Algorithm;
+use crate::experiment::Experiment;
+use crate::ideal::{Ideals, refresh_time};
+use crate::metrics::{Picture, mean, quantile, rmse, rmse_where};
+use crate::results::{Mean, Rmse, RunResult};
+use crate::subject::Subject;
+
+/// Which run.
+#[derive(Clone, Debug)]
+pub struct Cell {
+    /// The scene's name.
+    pub scene: String,
+    /// Who competes.
+    pub algorithm: Algorithm,
+    /// Samples per second.
+    pub samples_per_sec: f64,
+    /// Of the sampler.
+    pub seed: u64,
+}
+
+/// Runs a cell. `look` is shown the picture at every refresh, with the refresh's index.
+///
+/// # Errors
+/// If the tracer returns a colour that is not finite.
+pub fn run(
+    cell: &Cell,
+    experiment: &Experiment,
+    subject: &Subject,
+    ideals: &Ideals,
+    look: &mut dyn FnMut(usize, &Picture),
+) -> Result<RunResult, EngineError> {
+    let Algorithm::Frameless(kind) = &cell.algorithm;
+    let canvas = Canvas::from_picture(experiment.size, ideals.start.clone());
+    let clock = Clock::simulated(cell.samples_per_sec);
+    let mut engine = Engine::with_canvas(canvas, clock, kind.build(cell.seed), subject.tracer());
+
+    let (mut whole, mut changed) = (Vec::new(), Vec::new());
+    for (k, ideal) in ideals.pictures.iter().enumerate() {
+        engine.run_until(refresh_time(k, experiment.display_hz))?;
+        let picture = show(engine.canvas(), engine.display());
+        whole.push(rmse(&picture, ideal));
+        changed.push(rmse_where(&ideals.changed[k], &picture, ideal));
+        look(k, &picture);
+    }
+    Ok(summary(cell, experiment, whole, changed))
+}
+
+/// Reconstruction `hold` in full precision.
+fn show(canvas: &Canvas, display: &Display) -> Picture {
+    canvas.rgb().iter().map(|&rgb| display.encode(rgb)).collect()
+}
+
+fn summary(
+    cell: &Cell,
+    experiment: &Experiment,
+    whole: Vec<f64>,
+    changed: Vec<Option<f64>>,
+) -> RunResult {
+    let scored = experiment.unscored..;
+    RunResult {
+        scene: cell.scene.clone(),
+        algorithm: cell.algorithm.name(),
+        samples_per_sec: cell.samples_per_sec,
+        seed: cell.seed,
+        width: experiment.size.width,
+        height: experiment.size.height,
+        display_hz: experiment.display_hz,
+        refreshes: experiment.refreshes,
+        rmse: Rmse {
+            mean: mean(whole[scored.clone()].iter().copied()).expect("a refresh is scored"),
+            p95: quantile(whole[scored.clone()].to_vec(), 0.95),
+            curve: whole,
+        },
+        rmse_changed: Mean { mean: mean(changed[scored].iter().flatten().copied()) },
+    }
+}

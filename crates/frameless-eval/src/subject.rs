@@ -1,0 +1,80 @@
+//! What is looked at: a scene with the camera of the experiment.
+
+use std::sync::Arc;
+
+use frameless::{Answer, Batch, Request, Size, Tracer};
+use frameless_scene::{Limits, View};
+use frameless_trace::{Moment, Settings, World};
+
+use crate::camera_path::CameraPath;
+use crate::error::EvalError;
+use crate::experiment::{SceneSource, SceneSpec};
+
+/// A scene ready to be traced at any time.
+pub struct Subject {
+    world: Arc<World>,
+    camera: Option<CameraPath>,
+}
+
+impl Subject {
+    /// Loads the scene and builds what the tracer needs.
+    ///
+    /// # Errors
+    /// If the scene's file cannot be loaded.
+    pub fn load(spec: &SceneSpec) -> Result<Subject, EvalError> {
+        let scene = match &spec.source {
+            SceneSource::Builtin(name) => {
+                frameless_scene::builtin(name).expect("checked when the experiment was read")
+            }
+            SceneSource::File(path) => frameless_scene::load(path, &Limits::default())?,
+        };
+        Ok(Subject { world: Arc::new(World::new(Arc::new(scene))), camera: spec.camera.clone() })
+    }
+
+    /// A renderer of this subject that traces on the calling thread.
+    pub fn tracer(&self) -> SubjectTracer<'_> {
+        SubjectTracer { subject: self, moment: self.world.moment(0.0), answer: None }
+    }
+
+    /// The whole picture at exactly `secs`, linear RGB, one sample per pixel at its centre: what an
+    /// infinitely fast renderer would show.
+    pub fn ideal(&self, secs: f64, size: Size) -> Vec<[f32; 3]> {
+        let moment = self.world.moment(secs);
+        let requests: Vec<Request> = (0..size.pixels() as u32).map(Request::centre).collect();
+        self.trace(&moment, secs, size, &requests)
+    }
+
+    fn trace(&self, moment: &Moment, secs: f64, size: Size, requests: &[Request]) -> Vec<[f32; 3]> {
+        let view = self.view(moment, secs);
+        let settings = Settings { surfaces: false, ..Settings::default() };
+        let trace = |request: &Request| self.world.trace(moment, &view, size, request, &settings).0;
+        requests.iter().map(trace).collect()
+    }
+
+    fn view(&self, moment: &Moment, secs: f64) -> View {
+        match &self.camera {
+            Some(path) => path.view(secs),
+            None => self.world.scene().view_at(moment.state(), 0),
+        }
+    }
+}
+
+/// Traces batches of a [`Subject`] on the calling thread: with many runs side by side, one thread each is fastest.
+pub struct SubjectTracer<'a> {
+    subject: &'a Subject,
+    moment: Moment,
+    answer: Option<Answer>,
+}
+
+impl Tracer for SubjectTracer<'_> {
+    fn submit(&mut self, batch: Batch) {
+        let secs = batch.scene_secs;
+        self.subject.world.update_moment(secs, &mut self.moment);
+        let rgb = self.subject.trace(&self.moment, secs, batch.size, &batch.requests);
+        self.answer = Some(Answer::to(batch, rgb, Vec::new()));
+    }
+
+    fn collect(&mut self, _wait: bool) -> Option<Answer> {
+        self.answer.take()
+    }
+}

@@ -1,0 +1,180 @@
+//! Whole experiments, small ones.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use frameless_eval::{
+    EvalError, Experiment, Ideals, Picture, Progress, Results, Subject, compare, rmse,
+};
+
+/// Counts pictures; asks to stop after `limit` of them.
+struct Counting {
+    made: AtomicU64,
+    announced: AtomicU64,
+    limit: u64,
+}
+
+impl Counting {
+    fn new(limit: u64) -> Counting {
+        Counting { made: AtomicU64::new(0), announced: AtomicU64::new(0), limit }
+    }
+}
+
+impl Progress for Counting {
+    fn begin(&self, pictures: u64) {
+        self.announced.store(pictures, Ordering::Relaxed);
+    }
+    fn stage(&self, _what: &str) {}
+    fn advance(&self) {
+        self.made.fetch_add(1, Ordering::Relaxed);
+    }
+    fn should_stop(&self) -> bool {
+        self.made.load(Ordering::Relaxed) >= self.limit
+    }
+}
+
+const SMALL: &str = r#"
+    title = "small"
+    algorithms = ["random", "permutation", "change"]
+    samples_per_sec = [40_000]
+    seeds = [1, 2]
+    width = 64
+    height = 48
+    duration_secs = 0.5
+    unscored_secs = 0.1
+    [[scenes]]
+    scene = "sphere"
+    [output]
+    stills_secs = [0.5]
+"#;
+
+fn small() -> Experiment {
+    Experiment::parse(SMALL, Path::new("")).expect("valid")
+}
+
+fn run_with_threads(threads: usize, out: &Path) -> Results {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    pool.install(|| compare(&small(), out, &Counting::new(u64::MAX))).expect("it runs")
+}
+
+#[test]
+fn the_same_bytes_with_1_2_and_8_threads() {
+    let parent = tempfile::tempdir().expect("a temporary folder");
+    let files =
+        ["results.json", "sphere-40000-500ms.png", "sphere-40000-rmse.svg", "sphere-40000.mp4"];
+    let bytes = |threads: usize| {
+        let out = parent.path().join(format!("{threads}"));
+        run_with_threads(threads, &out);
+        files.map(|name| std::fs::read(out.join(name)).unwrap_or_else(|e| panic!("{name}: {e}")))
+    };
+    let one = bytes(1);
+    assert!(one == bytes(2), "two threads differ from one");
+    assert!(one == bytes(8), "eight threads differ from one");
+}
+
+#[test]
+fn results_say_what_was_asked_and_change_beats_random() {
+    let parent = tempfile::tempdir().expect("a temporary folder");
+    let out = parent.path().join("out");
+    let progress = Counting::new(u64::MAX);
+    let results = compare(&small(), &out, &progress).expect("it runs");
+    assert_eq!(
+        progress.made.into_inner(),
+        progress.announced.into_inner(),
+        "progress ends at 100 %"
+    );
+
+    let text = std::fs::read_to_string(out.join("results.json")).expect("written");
+    let read: Results = serde_json::from_str(&text).expect("as documented");
+    assert_eq!(read, results);
+    assert_eq!(results.runs.len(), 6);
+    for run in &results.runs {
+        assert_eq!((run.width, run.height, run.display_hz, run.refreshes), (64, 48, 60, 30));
+        assert_eq!(run.rmse.curve.len(), 30);
+        assert!(run.rmse.mean > 0.0 && run.rmse.p95 >= run.rmse.mean);
+        assert!(run.rmse_changed.mean.expect("the sphere moves") > run.rmse.mean);
+    }
+    let mean = |algorithm: &str| {
+        let runs = results.runs.iter().filter(|run| run.algorithm == algorithm);
+        runs.map(|run| run.rmse.mean).sum::<f64>() / 2.0
+    };
+    let (change, permutation, random) = (mean("change"), mean("permutation"), mean("random"));
+    assert!(change < permutation, "{change} {permutation}");
+    assert!(permutation < random, "{permutation} {random}");
+}
+
+#[test]
+fn the_ideal_against_itself_is_exactly_zero() {
+    let experiment = small();
+    let subject = Subject::load(&experiment.scenes[0]).expect("built in");
+    let trace = || Ideals::trace(&subject, &experiment, &|| (), &|| false).expect("not stopped");
+    let (a, b): (Vec<Picture>, Vec<Picture>) = (trace().pictures, trace().pictures);
+    assert!(a.iter().zip(&b).all(|(a, b)| rmse(a, b) == 0.0));
+    assert!(rmse(&a[0], &a[29]) > 0.0, "nothing moves");
+}
+
+#[test]
+fn an_interrupted_comparison_leaves_nothing_behind() {
+    let parent = tempfile::tempdir().expect("a temporary folder");
+    for limit in [0, 5, 40, 100] {
+        let outcome = compare(&small(), &parent.path().join("out"), &Counting::new(limit));
+        assert!(matches!(outcome, Err(EvalError::Interrupted)), "after {limit} pictures");
+        let left = parent.path().read_dir().expect("readable").count();
+        assert_eq!(left, 0, "after {limit} pictures");
+    }
+}
+
+#[test]
+fn bad_experiments_are_refused_by_key_and_line() {
+    for (from, to, part) in [
+        ("seeds = [1, 2]", "sedes = [1, 2]", "sedes"),
+        ("width = 64", "width = 0", "width"),
+        ("width = 64", "width = 64.5", "line 6"),
+        ("[40_000]", "[]", "samples_per_sec is empty"),
+        ("[40_000]", "[-1]", "samples_per_sec must be positive"),
+        ("\"random\", ", "\"chance\", ", "unknown algorithm \"chance\""),
+        ("\"sphere\"", "\"cube\"", "neither a built-in scene"),
+        ("stills_secs = [0.5]", "stills_secs = [0.6]", "stills_secs"),
+        ("stills_secs = [0.5]", "show = [\"nobody\"]", "show"),
+        ("unscored_secs = 0.1", "unscored_secs = 0.5", "unscored_secs"),
+        ("title = \"small\"", "", "title"),
+        ("scene = \"sphere\"", "scene = \"sphere\"\nname = \"../x\"", "only letters"),
+        ("scene = \"sphere\"", "scene = \"sphere\"\ncamera = { pitch = 1 }", "pitch"),
+    ] {
+        let text = SMALL.replacen(from, to, 1);
+        assert_ne!(text, SMALL);
+        let message = Experiment::parse(&text, Path::new("")).expect_err(to);
+        assert!(message.contains(part), "{to}: {message}");
+    }
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    let path = Path::new("no/such/experiment.toml");
+    let error = Experiment::read(path).expect_err("missing");
+    assert!(
+        error.is_bad_input() && error.to_string().contains("no/such/experiment.toml"),
+        "{error}"
+    );
+
+    let text = SMALL.replacen("\"sphere\"", "\"no-such-file.glb\"", 1);
+    let experiment = Experiment::parse(&text, Path::new("folder")).expect("not opened yet");
+    let parent = tempfile::tempdir().expect("a temporary folder");
+    let error = compare(&experiment, &parent.path().join("out"), &Counting::new(u64::MAX))
+        .expect_err("missing");
+    assert!(error.is_bad_input() && error.to_string().contains("no-such-file.glb"), "{error}");
+}
+
+#[test]
+fn the_experiments_in_the_repository_are_valid() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../experiments");
+    let mut read = 0;
+    for entry in folder.read_dir().expect("experiments/") {
+        let path = entry.expect("readable").path();
+        if path.extension().is_some_and(|e| e == "toml") {
+            Experiment::read(&path).unwrap_or_else(|error| panic!("{error}"));
+            read += 1;
+        }
+    }
+    assert!(read >= 2);
+}
