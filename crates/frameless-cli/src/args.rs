@@ -1,0 +1,238 @@
+//! What the program can be asked, and the help that teaches it.
+
+use std::path::PathBuf;
+
+use clap::{Args as ClapArgs, Parser, Subcommand};
+use frameless::Size;
+
+use crate::parse;
+
+const LONG_ABOUT: &str = "\
+Frameless rendering: every sample is one pixel traced at the current time and shown at once.
+
+There are no frames: a sampler chooses which pixels are worth tracing now, learns from what changed, and the
+picture is always as new as its newest sample. Without a subcommand a window opens on the scene `sphere`.";
+
+const AFTER_HELP: &str = "\
+Examples:
+  frameless                                            the moving sphere, in a window
+  frameless view model.glb --sampler random            your own scene, pixels chosen at random
+  frameless compare experiments/figures.toml --out out  how good is it? a report and a video
+  frameless render sphere --time 0.5 -o sphere.png     the ideal picture at one moment
+
+A SCENE is a glTF 2.0 file (.gltf or .glb) or the name of a built-in scene; see `frameless scenes`.
+
+Exit code: 0 success · 2 bad input (arguments, a missing or broken file) · 1 anything else (no display, a
+full disk). An error is one line on standard error that begins with `error:`. A picture or a report is
+written as a whole or not at all.";
+
+#[derive(Parser)]
+#[command(name = "frameless", version, about = "Frameless rendering", long_about = LONG_ABOUT)]
+#[command(after_help = AFTER_HELP, max_term_width = 100)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    pub(crate) command: Option<Command>,
+}
+
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    View(ViewArgs),
+    Compare(CompareArgs),
+    Render(RenderArgs),
+    Trace(TraceArgs),
+    Info(InfoArgs),
+    /// List the built-in scenes
+    #[command(after_help = "Example:\n  frameless scenes")]
+    Scenes,
+}
+
+/// Look at a scene in a window while it is being traced
+///
+/// Keys and mouse are explained in the window. Where there is no display, `frameless compare` makes a
+/// report and a video instead, and `frameless render` a picture.
+#[derive(ClapArgs)]
+#[command(after_help = "Examples:
+  frameless view
+  frameless view model.glb --sampler change --rate 900000
+  frameless view sphere --size 512x384 --screenshot shot.png --after 3")]
+pub(crate) struct ViewArgs {
+    /// A glTF file or a built-in scene
+    #[arg(default_value = DEFAULT_SCENE)]
+    pub(crate) scene: String,
+
+    /// Who chooses the pixels: random, permutation or change
+    #[arg(long, value_name = "NAME", value_parser = sampler_names())]
+    pub(crate) sampler: Option<String>,
+
+    /// Trace a picture of always the same size in pixels, whatever the window's [default: as the window]
+    #[arg(long, value_name = "WxH", value_parser = parse::size)]
+    pub(crate) size: Option<Size>,
+
+    /// At most so many samples per second [default: as many as the machine can]
+    #[arg(long, value_name = "SAMPLES", value_parser = parse::positive)]
+    pub(crate) rate: Option<f64>,
+
+    /// Begin with this camera of the scene, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) camera: u32,
+
+    /// Brighter (positive) or darker (negative) by so many powers of two
+    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = parse::stops)]
+    #[arg(allow_negative_numbers = true)]
+    pub(crate) exposure: f32,
+
+    /// Trace with so many threads; 0: one per core
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) threads: usize,
+
+    /// The seed of all random choices
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+
+    /// Save the window's picture to this PNG file after --after seconds, and end
+    #[arg(long, value_name = "FILE")]
+    pub(crate) screenshot: Option<PathBuf>,
+
+    /// When to save the screenshot, in seconds after the window has opened
+    #[arg(long, value_name = "SECS", default_value = "3", value_parser = parse::wait_secs)]
+    #[arg(requires = "screenshot")]
+    pub(crate) after: f64,
+}
+
+/// The scene of `frameless` without arguments.
+const DEFAULT_SCENE: &str = "sphere";
+
+impl Default for ViewArgs {
+    /// As if `frameless view` had been typed.
+    fn default() -> ViewArgs {
+        ViewArgs {
+            scene: DEFAULT_SCENE.into(),
+            sampler: None,
+            size: None,
+            rate: None,
+            camera: 0,
+            exposure: 0.0,
+            threads: 0,
+            seed: 1,
+            screenshot: None,
+            after: 3.0,
+        }
+    }
+}
+
+/// Measure algorithms against the ideal picture: numbers, curves, a report and a video
+///
+/// An experiment is a TOML file that names scenes, algorithms and sample rates; `experiments/` has some.
+/// The same experiment gives the same numbers on every machine: time is simulated.
+#[derive(ClapArgs)]
+#[command(after_help = "Example:
+  frameless compare experiments/figures.toml --out out")]
+pub(crate) struct CompareArgs {
+    /// The experiment, a TOML file
+    pub(crate) experiment: PathBuf,
+
+    /// The folder for results, report and video
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+}
+
+/// Trace the whole picture at one moment: the ideal that every algorithm is compared with
+#[derive(ClapArgs)]
+#[command(after_help = "Examples:
+  frameless render sphere --time 0.5 -o sphere.png
+  frameless render model.glb --time 0 --size 1920x1080 --camera 1 --exposure -1 -o model.png")]
+pub(crate) struct RenderArgs {
+    /// A glTF file or a built-in scene
+    pub(crate) scene: String,
+
+    /// The moment, in seconds of the scene's own time
+    #[arg(long, value_name = "SECS", default_value = "0", value_parser = parse::finite)]
+    #[arg(allow_negative_numbers = true)]
+    pub(crate) time: f64,
+
+    /// The PNG file to be written
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+
+    /// Width and height in pixels
+    #[arg(long, value_name = "WxH", default_value = "512x384", value_parser = parse::size)]
+    pub(crate) size: Size,
+
+    /// Which of the scene's cameras, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) camera: u32,
+
+    /// Brighter (positive) or darker (negative) by so many powers of two
+    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = parse::stops)]
+    #[arg(allow_negative_numbers = true)]
+    pub(crate) exposure: f32,
+}
+
+/// Trace one pixel and tell every step: the ray, what it hit, each light, the colour
+#[derive(ClapArgs)]
+#[command(after_help = "Example:
+  frameless trace sphere --pixel 256,192 --time 0.5")]
+pub(crate) struct TraceArgs {
+    /// A glTF file or a built-in scene
+    pub(crate) scene: String,
+
+    /// Column and row, counted from the top left
+    #[arg(long, value_name = "X,Y", value_parser = parse::pixel)]
+    pub(crate) pixel: (u32, u32),
+
+    /// The moment, in seconds of the scene's own time
+    #[arg(long, value_name = "SECS", default_value = "0", value_parser = parse::finite)]
+    #[arg(allow_negative_numbers = true)]
+    pub(crate) time: f64,
+
+    /// Width and height of the picture that the pixel belongs to
+    #[arg(long, value_name = "WxH", default_value = "512x384", value_parser = parse::size)]
+    pub(crate) size: Size,
+
+    /// Which of the scene's cameras, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) camera: u32,
+}
+
+/// Tell what is in a scene: shapes, materials, textures, cameras, lights, motion, and what was ignored
+#[derive(ClapArgs)]
+#[command(after_help = "Examples:
+  frameless info sphere
+  frameless info model.glb")]
+pub(crate) struct InfoArgs {
+    /// A glTF file or a built-in scene
+    pub(crate) scene: String,
+}
+
+fn sampler_names() -> clap::builder::PossibleValuesParser {
+    frameless::SamplerKind::ALL.map(|kind| kind.name()).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        Args::command().debug_assert();
+    }
+
+    #[test]
+    fn no_arguments_mean_what_view_means() {
+        let Ok(Args { command: Some(Command::View(typed)) }) =
+            Args::try_parse_from(["frameless", "view"])
+        else {
+            panic!("`frameless view` is refused");
+        };
+        let default = ViewArgs::default();
+        assert_eq!(
+            (typed.scene, typed.sampler, typed.size, typed.rate, typed.camera),
+            (default.scene, default.sampler, default.size, default.rate, default.camera)
+        );
+        assert_eq!(
+            (typed.exposure, typed.threads, typed.seed, typed.screenshot, typed.after),
+            (default.exposure, default.threads, default.seed, default.screenshot, default.after)
+        );
+    }
+}

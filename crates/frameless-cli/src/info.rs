@@ -1,0 +1,159 @@
+//! `frameless info`: what is in a scene.
+
+use std::fmt::Write;
+
+use frameless_scene::{
+    AfterEnd, Camera, Geometry, Image, Light, LightKind, Mesh, Projection, Scene, Target,
+};
+
+use crate::args::InfoArgs;
+use crate::failure::Failure;
+use crate::{input, output};
+
+/// Bytes in a mebibyte.
+const MIB: f64 = 1_048_576.0;
+
+/// Load the scene and tell.
+pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
+    let scene = input::scene(&args.scene)?;
+    Ok(output::print(&describe(&scene))?)
+}
+
+/// A paragraph of lines `what  how many`, lists indented below, warnings last.
+fn describe(scene: &Scene) -> String {
+    let mut lines = vec![format!("scene       {}", scene.name)];
+    lines.extend([shapes(scene), triangles(scene), bounds(scene)]);
+    lines.push(format!("materials   {}", scene.materials.len()));
+    lines.push(format!("textures    {}", textures(scene)));
+    lines.extend(scene.images.iter().enumerate().map(|(i, image)| item(i, &picture(image))));
+    lines.push(format!("cameras     {}", scene.cameras.len()));
+    lines.extend(scene.cameras.iter().enumerate().map(|(i, view)| item(i, &camera(view))));
+    lines.push(format!("lights      {}", scene.lights.len()));
+    lines.extend(scene.lights.iter().enumerate().map(|(i, lamp)| item(i, &light(lamp))));
+    lines.push(format!("motion      {}", motion(scene)));
+    lines.extend(scene.notes.iter().map(|note| format!("note: {note}")));
+    lines.extend(scene.warnings.iter().map(|warning| format!("warning: {warning}")));
+    lines.iter().map(|line| output::printable(line) + "\n").collect()
+}
+
+fn item(index: usize, text: &str) -> String {
+    format!("{index:>12}  {text}")
+}
+
+fn shapes(scene: &Scene) -> String {
+    let spheres = scene.geometries.iter().filter(|g| matches!(g, Geometry::Sphere { .. })).count();
+    format!(
+        "geometries  {} meshes and {spheres} spheres, as {} instances at {} nodes",
+        scene.geometries.len() - spheres,
+        scene.instances.len(),
+        scene.nodes.len()
+    )
+}
+
+fn triangles(scene: &Scene) -> String {
+    let of = |geometry: &Geometry| mesh(geometry).map_or(0, |mesh| mesh.triangles.len());
+    let stored: usize = scene.geometries.iter().map(of).sum();
+    let seen: usize = scene
+        .instances
+        .iter()
+        .map(|instance| of(&scene.geometries[instance.geometry as usize]))
+        .sum();
+    let bytes: usize = scene.geometries.iter().filter_map(mesh).map(mesh_bytes).sum();
+    format!(
+        "triangles   {stored} in {:.1} MiB, {seen} with every instance counted",
+        bytes as f64 / MIB
+    )
+}
+
+fn mesh(geometry: &Geometry) -> Option<&Mesh> {
+    match geometry {
+        Geometry::Mesh(mesh) => Some(mesh),
+        Geometry::Sphere { .. } => None,
+    }
+}
+
+/// Without the BVH, which takes about as much again.
+fn mesh_bytes(mesh: &Mesh) -> usize {
+    size_of_val(&mesh.positions[..])
+        + size_of_val(&mesh.normals[..])
+        + mesh.uvs.iter().map(|set| size_of_val(&set[..])).sum::<usize>()
+        + size_of_val(&mesh.colors[..])
+        + size_of_val(&mesh.triangles[..])
+        + size_of_val(&mesh.triangle_materials[..])
+}
+
+fn bounds(scene: &Scene) -> String {
+    match scene.bounds_at(&scene.state_at(0.0)) {
+        Some(bounds) => format!("bounds      {} to {} m, at 0 s", bounds.min, bounds.max),
+        None => "bounds      nothing to be seen".into(),
+    }
+}
+
+fn textures(scene: &Scene) -> String {
+    let bytes: usize = scene.images.iter().map(image_bytes).sum();
+    let (textures, images) = (scene.textures.len(), scene.images.len());
+    format!("{textures} of {images} images, {:.1} MiB", bytes as f64 / MIB)
+}
+
+fn image_bytes(image: &Image) -> usize {
+    size_of_val(&image.rgba[..])
+}
+
+fn picture(image: &Image) -> String {
+    format!("{}×{}, {:.2} MiB", image.width, image.height, image_bytes(image) as f64 / MIB)
+}
+
+fn camera(camera: &Camera) -> String {
+    let projection = match camera.projection {
+        Projection::Perspective { yfov_rad } => {
+            format!("perspective, {:.1}° from top to bottom", yfov_rad.to_degrees())
+        }
+        Projection::Orthographic { ymag } => {
+            format!("orthographic, {} m from top to bottom", 2.0 * ymag)
+        }
+    };
+    if camera.name.is_empty() { projection } else { format!("{projection}, {:?}", camera.name) }
+}
+
+fn light(light: &Light) -> String {
+    let (kind, unit) = match light.kind {
+        LightKind::Point => ("point", "W/sr"),
+        LightKind::Directional => ("directional", "W/m²"),
+        LightKind::Spot { .. } => ("spot", "W/sr"),
+    };
+    format!("{kind}, {} {unit}", light.intensity)
+}
+
+fn motion(scene: &Scene) -> String {
+    let animation = &scene.animation;
+    if animation.duration_secs == 0.0 {
+        return "none".into();
+    }
+    let after_end = match animation.after_end {
+        AfterEnd::Repeat => "then again",
+        AfterEnd::Hold => "then still",
+    };
+    let mut text = format!("{:.3} s, {after_end}; channels:", animation.duration_secs);
+    let mut counts: Vec<(&str, usize)> = Vec::new();
+    for channel in &animation.channels {
+        let name = driven(channel.target);
+        match counts.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((name, 1)),
+        }
+    }
+    for (name, count) in counts {
+        // Writing to a string cannot fail.
+        let _ = write!(text, " {count} {name}");
+    }
+    text
+}
+
+fn driven(target: Target) -> &'static str {
+    match target {
+        Target::Translation(_) => "translation",
+        Target::Rotation(_) => "rotation",
+        Target::Scale(_) => "scale",
+        Target::LightIntensity(_) => "light",
+    }
+}

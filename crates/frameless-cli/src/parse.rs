@@ -1,0 +1,101 @@
+//! From the text of an argument to a checked value.
+
+use frameless::Size;
+
+/// Longest side of a picture: what GPUs take as a texture.
+const MAX_SIDE: u32 = 16_384;
+
+/// Most pixels of a picture: 64 Mi pixels hold about 3 GB of samples.
+const MAX_PIXELS: usize = 1 << 26;
+
+/// `WxH` in pixels.
+pub(crate) fn size(text: &str) -> Result<Size, String> {
+    let (width, height) =
+        two_numbers(text, 'x').ok_or("wanted WIDTHxHEIGHT in pixels, such as 512x384")?;
+    if width == 0 || height == 0 || width > MAX_SIDE || height > MAX_SIDE {
+        return Err(format!("each side must be between 1 and {MAX_SIDE} pixels"));
+    }
+    let size = Size::new(width, height);
+    if size.pixels() > MAX_PIXELS {
+        return Err(format!("a picture may have at most {MAX_PIXELS} pixels"));
+    }
+    Ok(size)
+}
+
+/// `X,Y` in pixels: column and row, counted from the top left.
+pub(crate) fn pixel(text: &str) -> Result<(u32, u32), String> {
+    two_numbers(text, ',')
+        .ok_or_else(|| "wanted X,Y: column and row from the top left, such as 256,192".into())
+}
+
+/// A number that is neither infinite nor NaN.
+pub(crate) fn finite(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => Err("wanted a finite number".into()),
+    }
+}
+
+/// A finite number above zero.
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
+    match finite(text) {
+        Ok(number) if number > 0.0 => Ok(number),
+        _ => Err("wanted a number above zero".into()),
+    }
+}
+
+/// A number of seconds that a person might wait: above zero, at most a day.
+pub(crate) fn wait_secs(text: &str) -> Result<f64, String> {
+    const DAY_SECS: f64 = 86_400.0;
+    match positive(text) {
+        Ok(secs) if secs <= DAY_SECS => Ok(secs),
+        _ => Err("wanted seconds, above zero and at most a day".into()),
+    }
+}
+
+/// Exposure in stops. 2^±64 reaches from the darkest to the brightest light there is.
+pub(crate) fn stops(text: &str) -> Result<f32, String> {
+    match finite(text) {
+        Ok(stops) if stops.abs() <= 64.0 => Ok(stops as f32),
+        _ => Err("wanted stops between -64 and 64".into()),
+    }
+}
+
+fn two_numbers(text: &str, separator: char) -> Option<(u32, u32)> {
+    let (first, second) = text.split_once(separator)?;
+    Some((first.parse().ok()?, second.parse().ok()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes() {
+        assert_eq!(size("512x384"), Ok(Size::new(512, 384)));
+        assert_eq!(size("16384x1"), Ok(Size::new(16_384, 1)));
+        for bad in ["", "512", "x", "512x", "0x1", "1x0", "16385x1", "-1x5", "16384x16384", "1x1x1"]
+        {
+            assert!(size(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn pixels() {
+        assert_eq!(pixel("3,0"), Ok((3, 0)));
+        for bad in ["", "3", "3,", "-1,0", "1.5,2", "1,2,3", "99999999999,0"] {
+            assert!(pixel(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn numbers() {
+        assert_eq!(finite("-2.5"), Ok(-2.5));
+        assert!(["inf", "nan", "1e999", "", "x"].iter().all(|bad| finite(bad).is_err()));
+        assert_eq!(positive("9e5"), Ok(9e5));
+        assert!(["0", "-1", "inf", "nan"].iter().all(|bad| positive(bad).is_err()));
+        assert!(wait_secs("86401").is_err());
+        assert_eq!(stops("-3"), Ok(-3.0));
+        assert!(stops("65").is_err());
+    }
+}

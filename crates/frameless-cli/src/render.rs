@@ -1,0 +1,44 @@
+//! `frameless render`: the whole picture at one moment.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use anyhow::Context;
+use frameless::Display;
+use frameless_trace::{Settings, ViewSource, World};
+use indicatif::ProgressBar;
+
+use crate::args::RenderArgs;
+use crate::failure::Failure;
+use crate::{input, output};
+
+/// Trace every pixel's centre and write the picture.
+pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
+    output::check_png_path(&args.out)?;
+    let scene = input::scene(&args.scene)?;
+    let view = ViewSource::Camera(input::camera(&scene, args.camera)?);
+    input::tell_warnings(&scene);
+
+    let waiting = waiting();
+    waiting.set_message(format!("building the BVH of {}", scene.name));
+    let world = World::new(Arc::new(scene));
+    waiting.set_message(format!("tracing {}×{} pixels", args.size.width, args.size.height));
+    let pool = rayon::ThreadPoolBuilder::new().build().context("cannot start threads")?;
+    let radiance =
+        frameless_trace::render(&world, args.time, &view, args.size, &Settings::default(), &pool);
+    waiting.set_message("writing");
+    let display = Display::new(args.exposure);
+    let rgba = radiance.into_iter().map(|rgb| display.encode_rgba8(rgb)).collect();
+    output::write_png(&args.out, args.size.width, args.size.height, rgba)?;
+    waiting.finish_and_clear();
+    Ok(())
+}
+
+/// What is being done and for how long, on a terminal; nothing elsewhere.
+fn waiting() -> ProgressBar {
+    /// Work that is done sooner shows nothing at all on most terminals, which is right.
+    const TICK: Duration = Duration::from_millis(100);
+    let waiting = ProgressBar::new_spinner();
+    waiting.enable_steady_tick(TICK);
+    waiting
+}

@@ -1,0 +1,32 @@
+//! `frameless trace`: one pixel, step by step.
+
+use std::sync::Arc;
+
+use anyhow::anyhow;
+use frameless::Request;
+use frameless_trace::{Settings, ViewSource, World};
+
+use crate::args::TraceArgs;
+use crate::failure::Failure;
+use crate::{input, output};
+
+/// Trace the pixel's centre and tell.
+pub(crate) fn run(args: &TraceArgs) -> Result<(), Failure> {
+    let (x, y) = args.pixel;
+    let size = args.size;
+    if x >= size.width || y >= size.height {
+        return Err(Failure::bad_input(anyhow!(
+            "--pixel {x},{y}: the picture has {}×{} pixels, counted from 0",
+            size.width,
+            size.height
+        )));
+    }
+    let scene = input::scene(&args.scene)?;
+    let view = ViewSource::Camera(input::camera(&scene, args.camera)?);
+    input::tell_warnings(&scene);
+    let world = World::new(Arc::new(scene));
+    let request = Request::centre(size.index(x, y));
+    let steps =
+        frameless_trace::explain(&world, args.time, &view, size, &request, &Settings::default());
+    Ok(output::print(&(steps.join("\n") + "\n"))?)
+}

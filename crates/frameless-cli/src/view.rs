@@ -1,0 +1,60 @@
+//! `frameless view`: the window.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use anyhow::anyhow;
+use frameless::SamplerKind;
+use frameless_view::{PictureSize, Settings, ViewOptions};
+
+use crate::args::ViewArgs;
+use crate::failure::Failure;
+use crate::{input, output};
+
+/// The screenshot is taken by the graphics driver and arrives some refreshes after it was asked for; a
+/// software driver on a busy machine may take a second for it.
+const SCREENSHOT_ARRIVES: Duration = Duration::from_secs(2);
+
+/// Open the window; returns when it is closed.
+pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
+    if let Some(screenshot) = &args.screenshot {
+        output::check_png_path(screenshot)?;
+    }
+    let mut scene = input::scene(&args.scene)?;
+    let first = input::camera(&scene, args.camera)?;
+    input::tell_warnings(&scene);
+    // The window begins with the first camera.
+    scene.cameras.rotate_left(first as usize);
+    let mut options = ViewOptions::new(Arc::new(scene));
+    options.settings = settings(args);
+    options.threads = args.threads;
+    options.seed = args.seed;
+    let Some(screenshot) = &args.screenshot else { return Ok(frameless_view::run(options)?) };
+
+    let after = Duration::from_secs_f64(args.after);
+    options.screenshot_after = Some((after, screenshot.clone()));
+    options.exit_after = Some(after + SCREENSHOT_ARRIVES);
+    // Whether the window has written it can only be told if no older one lies there.
+    output::remove_file(screenshot)?;
+    frameless_view::run(options)?;
+    if screenshot.exists() {
+        return Ok(());
+    }
+    let shown = screenshot.display();
+    Err(Failure::other(anyhow!("{shown} was not written: the window was closed too early")))
+}
+
+fn settings(args: &ViewArgs) -> Settings {
+    let default = Settings::default();
+    Settings {
+        sampler: args
+            .sampler
+            .as_deref()
+            .and_then(SamplerKind::from_name)
+            .unwrap_or(default.sampler),
+        samples_per_sec: args.rate,
+        exposure_stops: args.exposure,
+        picture: args.size.map_or(default.picture, PictureSize::Fixed),
+        ..default
+    }
+}

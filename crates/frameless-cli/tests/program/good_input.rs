@@ -1,0 +1,65 @@
+//! What works.
+
+use frameless_scene::BUILTIN_NAMES;
+
+use crate::run::frameless;
+
+#[test]
+fn the_built_in_scenes_are_listed_one_per_line() {
+    let list = frameless(&["scenes"]).succeeded().out;
+    let names: Vec<_> = list.lines().filter_map(|line| line.split(' ').next()).collect();
+    assert_eq!(names, BUILTIN_NAMES);
+}
+
+#[test]
+fn every_built_in_scene_can_be_told_of() {
+    for name in BUILTIN_NAMES {
+        let told = frameless(&["info", name]).succeeded().out;
+        assert!(told.starts_with(&format!("scene       {name}\n")), "{told}");
+        for line in ["geometries", "triangles", "bounds", "cameras", "lights", "motion"] {
+            assert!(told.lines().any(|told| told.starts_with(line)), "no {line} in {told}");
+        }
+    }
+}
+
+#[test]
+fn a_picture_of_a_moving_scene_changes_with_time_and_only_with_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let render = |name: &str, time: &str| {
+        let out = folder.path().join(name);
+        let arguments = ["render", "sphere", "--size", "64x48", "--time", time, "-o"];
+        let arguments = arguments.iter().map(Into::into).chain([out.as_os_str().to_owned()]);
+        frameless(&arguments.collect::<Vec<std::ffi::OsString>>()).succeeded();
+        std::fs::read(out).unwrap()
+    };
+    let first = render("a.png", "0.5");
+    let picture = image::load_from_memory(&first).unwrap().to_rgb8();
+    assert_eq!(picture.dimensions(), (64, 48));
+    let brightest = picture.pixels().flat_map(|pixel| pixel.0).max();
+    assert!(brightest > Some(64), "a black picture");
+    assert_eq!(first, render("b.png", "0.5"));
+    assert_ne!(first, render("c.png", "0.9"));
+    let names: Vec<_> = std::fs::read_dir(folder.path()).unwrap().collect();
+    assert_eq!(names.len(), 3, "left behind: {names:?}");
+}
+
+#[test]
+fn exposure_makes_a_picture_darker() {
+    let folder = tempfile::tempdir().unwrap();
+    let sum = |exposure: &str| {
+        let out = folder.path().join(format!("{exposure}.png"));
+        let out = out.to_string_lossy();
+        let arguments =
+            ["render", "sphere", "--size", "32x24", "--exposure", exposure, "--out", &out];
+        frameless(&arguments).succeeded();
+        let picture = image::open(out.as_ref()).unwrap().to_rgb8();
+        picture.pixels().flat_map(|pixel| pixel.0).map(u64::from).sum::<u64>()
+    };
+    assert!(sum("-2") < sum("0"));
+}
+
+#[test]
+fn a_pixel_is_told_step_by_step() {
+    let told = frameless(&["trace", "sphere", "--pixel", "256,192", "--time", "0.5"]);
+    assert!(told.succeeded().out.lines().count() > 3);
+}
