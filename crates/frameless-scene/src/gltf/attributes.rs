@@ -139,7 +139,6 @@ impl Vertices {
 /// Linear RGB or RGBA.
 fn read_colors(accessor: &Accessor<'_>, budget: &mut Budget) -> Result<Vec<Vec4>, Fault> {
     if accessor.width == 3 {
-        budget.allocate("", accessor.count, size_of::<Vec4>())?;
         let rgb = accessor.numbers::<3>(budget)?;
         return Ok(rgb.into_iter().map(|[r, g, b]| Vec4::new(r, g, b, 1.0)).collect());
     }

@@ -32,12 +32,12 @@ pub(super) fn add_camera(scene: &mut Scene) {
     scene.notes.push("no camera in the file: added one that shows everything".to_owned());
 }
 
-/// Adds light, if the scene has no lights.
+/// Adds light, if the scene has no lights: all of it, or a little where surfaces glow.
 pub(super) fn add_light(scene: &mut Scene) {
     if !scene.lights.is_empty() {
         return;
     }
-    if has_emissive_triangles(scene) {
+    if has_glowing_triangles(scene) {
         // Lets the scene be seen by renderers that do not follow light from glowing surfaces to others.
         scene.ambient = Vec3::splat(0.2);
         let note = "no light in the file but glowing surfaces: added faint ambient light";
@@ -68,8 +68,13 @@ fn add_key_light(scene: &mut Scene) {
     });
 }
 
-fn has_emissive_triangles(scene: &Scene) -> bool {
-    let glows = |material: &u32| scene.materials[*material as usize].emissive != Vec3::ZERO;
+/// Whether anything is made to light the scene, rather than to be a signal lamp or a screen in it.
+fn has_glowing_triangles(scene: &Scene) -> bool {
+    /// What a white surface reaches in the added light; a lamp is brighter.
+    const LAMP_RADIANCE: f32 = 1.0;
+    let glows = |material: &u32| {
+        scene.materials[*material as usize].emissive.max_element() >= LAMP_RADIANCE
+    };
     scene.instances.iter().any(|instance| match &scene.geometries[instance.geometry as usize] {
         Geometry::Mesh(mesh) => mesh.triangle_materials.iter().any(glows),
         Geometry::Sphere { material } => glows(material),

@@ -94,17 +94,16 @@ fn from_bytes(
 
 fn check_version(root: &Json<'_>) -> Result<(), Fault> {
     let asset = root.required("asset")?;
-    for key in ["version", "minVersion"] {
-        let version = match key {
-            "version" => Some(asset.required(key)?),
-            _ => asset.field(key)?,
-        };
-        let Some(version) = version else { continue };
-        if version.text()?.split('.').next() != Some("2") {
-            return Err(version.fault("glTF version 2.x"));
-        }
+    refuse_other_than_2(&asset.required("version")?)?;
+    asset.field("minVersion")?.map_or(Ok(()), |version| refuse_other_than_2(&version))
+}
+
+/// Within a major version, newer files can be read by older readers (glTF 2.0 §3.2).
+fn refuse_other_than_2(version: &Json<'_>) -> Result<(), Fault> {
+    match version.text()?.split('.').next() {
+        Some("2") => Ok(()),
+        _ => Err(version.fault("glTF version 2.x")),
     }
-    Ok(())
 }
 
 fn build(document: &mut Document<'_>, chosen_scene: Option<usize>) -> Result<Scene, Fault> {

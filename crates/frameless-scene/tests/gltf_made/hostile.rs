@@ -215,7 +215,8 @@ fn a_chain_of_huge_scales_has_no_place_in_the_world() {
 
 #[test]
 fn every_limit_is_held() {
-    let lower: [(&str, fn(&mut Limits)); 11] = [
+    type Lower = fn(&mut Limits);
+    let lower: [(&str, Lower); 11] = [
         ("bytes of file", |limits| limits.file_bytes = 100),
         ("decoded bytes", |limits| limits.decoded_bytes = 100),
         ("triangles", |limits| limits.triangles = 1),

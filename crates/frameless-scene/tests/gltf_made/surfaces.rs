@@ -4,7 +4,7 @@ use frameless_scene::{Filter, Limits, Scene, TextureRef, Wrap, load_bytes};
 use glam::{Vec3, Vec4};
 use serde_json::{Value, json};
 
-use super::maker::{Maker, png, rich};
+use super::maker::{Maker, SQUARE, png, rich};
 
 /// A document with one material.
 fn with_material(material: Value) -> Maker {
@@ -170,4 +170,20 @@ fn other_versions_are_refused() {
     let mut maker = Maker::new();
     maker.json["asset"] = json!({"version": "2.1"});
     assert!(maker.try_load().is_ok());
+}
+
+/// A lamp is made to light the scene; a screen is not.
+#[test]
+fn light_is_added_unless_something_shines() {
+    for (strength, lights, ambient) in [(0.0, 1, 0.25), (0.9, 1, 0.25), (5.0, 0, 0.2)] {
+        let mut maker = Maker::with_primitive(
+            |maker| json!({"attributes": {"POSITION": maker.floats("VEC3", &SQUARE)}, "material": 0}),
+        );
+        let strength = json!({"KHR_materials_emissive_strength": {"emissiveStrength": strength}});
+        maker.push("materials", json!({"emissiveFactor": [1.0, 1.0, 1.0], "extensions": strength}));
+        let scene = maker.load();
+        assert_eq!(scene.lights.len(), lights, "{strength}");
+        assert_eq!(scene.ambient, Vec3::splat(ambient), "{strength}");
+        assert!(scene.notes.iter().any(|note| note.contains("no light in the file")));
+    }
 }
