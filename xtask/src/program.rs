@@ -1,14 +1,14 @@
 //! The program as a user runs it: the commands of its help, on real input.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::Duration;
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 
 use crate::command::output_within;
-use crate::picture;
 use crate::steps::Done;
+use crate::{missing, picture};
 
 /// Each of these commands takes a second or two; this is a hang.
 const LIMIT: Duration = Duration::from_secs(60);
@@ -29,7 +29,8 @@ pub(crate) fn as_a_user(program: &Path, out: &Path) -> Result<Done> {
     let (width, height) = picture::shows_something(&ideal)?;
     ensure!((width, height) == (256, 192), "asked for 256×192 pixels, got {width}×{height}");
 
-    for scene in said(program, &["scenes"])?.lines().filter_map(|line| line.split(' ').next()) {
+    let scenes = said(program, &["scenes"])?;
+    for scene in scenes.lines().filter_map(|line| line.split(' ').next()) {
         ensure!(said(program, &["info", scene])?.contains("triangles"), "no triangles in {scene}");
     }
     said(program, &["trace", "sphere", "--pixel", "128,96", "--time", "0.5"])?;
@@ -44,15 +45,56 @@ pub(crate) fn as_a_user(program: &Path, out: &Path) -> Result<Done> {
     Ok(Done::passed(format!("{}", ideal.display())))
 }
 
-/// A small comparison: its report, its numbers, and that its video plays.
+/// A small comparison: its numbers, its still, and that its video plays.
 pub(crate) fn a_comparison(program: &Path, out: &Path) -> Result<Done> {
-    let experiment = crate::project_dir().join("experiments/smoke.toml");
-    let arguments =
-        ["compare", &experiment.to_string_lossy(), "--out", &out.join("smoke").to_string_lossy()]
-            .map(String::from);
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    succeeded(&answer(program, &arguments, COMPARISON_LIMIT)?)?;
-    Ok(Done::passed(""))
+    let experiment = crate::project_dir().join("xtask/smoke.toml");
+    let out = out.join("smoke");
+    let (experiment, folder) = (experiment.to_string_lossy(), out.to_string_lossy());
+    succeeded(&answer(program, &["compare", &experiment, "--out", &folder], COMPARISON_LIMIT)?)?;
+
+    let results = std::fs::read_to_string(out.join("results.json"))
+        .context("the comparison wrote no results.json")?;
+    for algorithm in ["\"random\"", "\"change\""] {
+        ensure!(results.contains(algorithm), "results.json does not know {algorithm}");
+    }
+    ensure!(!files(&out, "svg")?.is_empty(), "the comparison drew no curves");
+    for still in files(&out, "png")? {
+        picture::shows_something(&still)?;
+    }
+    let missing = missing::to_read_a_video();
+    if let Some(missing) = missing.first() {
+        let skipped = vec![format!("the comparison's video: {missing}")];
+        return Ok(Done { skipped, ..Done::passed("") });
+    }
+    let videos = files(&out, "mp4")?;
+    ensure!(videos.len() == 1, "wanted one video, got {}", videos.len());
+    let frames = frames_of(&videos[0])?;
+    ensure!(frames == VIDEO_FRAMES, "the video has {frames} frames, not {VIDEO_FRAMES}");
+    Ok(Done::passed(format!("{frames} frames of video")))
+}
+
+/// Half a second at 60 Hz.
+const VIDEO_FRAMES: usize = 30;
+
+/// The frames that a decoder finds, in a stream that is H.264.
+fn frames_of(video: &Path) -> Result<usize> {
+    let mut ffprobe = Command::new("ffprobe");
+    ffprobe.args(["-v", "error", "-count_frames", "-select_streams", "v:0", "-show_entries"]);
+    ffprobe.args(["stream=codec_name,nb_read_frames", "-of", "csv=p=0"]).arg(video);
+    let answer = output_within(&mut ffprobe, LIMIT)?;
+    succeeded(&answer)?;
+    ensure!(answer.stderr.is_empty(), "{}", String::from_utf8_lossy(&answer.stderr));
+    let said = String::from_utf8_lossy(&answer.stdout).trim().to_owned();
+    let frames = said.strip_prefix("h264,").and_then(|frames| frames.parse().ok());
+    frames.with_context(|| format!("wanted an H.264 stream, ffprobe says {said:?}"))
+}
+
+/// Files with this extension in a folder.
+fn files(folder: &Path, extension: &str) -> Result<Vec<PathBuf>> {
+    let entries = folder.read_dir().with_context(|| format!("no {}", folder.display()))?;
+    let paths = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>>>()?;
+    let wanted = |path: &PathBuf| path.extension().is_some_and(|found| found == extension);
+    Ok(paths.into_iter().filter(wanted).collect())
 }
 
 /// What a command that must succeed printed.

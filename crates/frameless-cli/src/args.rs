@@ -10,21 +10,26 @@ use crate::parse;
 const LONG_ABOUT: &str = "\
 Frameless rendering: every sample is one pixel traced at the current time and shown at once.
 
-There are no frames: a sampler chooses which pixels are worth tracing now, learns from what changed, and the
-picture is always as new as its newest sample. Without a subcommand a window opens on the scene `sphere`.";
+There are no frames: a sampler chooses which pixels are worth tracing now, learns from what changed, and \
+the picture is always as new as its newest sample. Without a subcommand a window opens on the scene \
+`sphere`.";
 
 const AFTER_HELP: &str = "\
 Examples:
-  frameless                                            the moving sphere, in a window
-  frameless view model.glb --sampler random            your own scene, pixels chosen at random
-  frameless compare experiments/figures.toml --out out  how good is it? a report and a video
-  frameless render sphere --time 0.5 -o sphere.png     the ideal picture at one moment
+  frameless
+      the moving sphere, in a window
+  frameless view model.glb --sampler random
+      your own scene, pixels chosen at random
+  frameless compare experiments/figures.toml --out out/figures
+      how good is it? numbers, curves, pictures and a video
+  frameless render sphere --time 0.5 -o sphere.png
+      the ideal picture at one moment
 
 A SCENE is a glTF 2.0 file (.gltf or .glb) or the name of a built-in scene; see `frameless scenes`.
 
-Exit code: 0 success · 2 bad input (arguments, a missing or broken file) · 1 anything else (no display, a
-full disk). An error is one line on standard error that begins with `error:`. A picture or a report is
-written as a whole or not at all.";
+Exit code: 0 success, 2 bad input (arguments, a missing or broken file), 1 anything else (no display, a \
+full disk). An error is one line on standard error that begins with `error:`. A picture or the folder of \
+a comparison appears whole or not at all.";
 
 #[derive(Parser)]
 #[command(name = "frameless", version, about = "Frameless rendering", long_about = LONG_ABOUT)]
@@ -48,8 +53,8 @@ pub(crate) enum Command {
 
 /// Look at a scene in a window while it is being traced
 ///
-/// Keys and mouse are explained in the window. Where there is no display, `frameless compare` makes a
-/// report and a video instead, and `frameless render` a picture.
+/// Keys and mouse are explained in the window. Where there is no display, `frameless compare` makes
+/// pictures and a video instead, and `frameless render` a picture.
 #[derive(ClapArgs)]
 #[command(after_help = "Examples:
   frameless view
@@ -120,18 +125,18 @@ impl Default for ViewArgs {
     }
 }
 
-/// Measure algorithms against the ideal picture: numbers, curves, a report and a video
+/// Measure algorithms against the ideal picture: numbers, curves, pictures and a video
 ///
 /// An experiment is a TOML file that names scenes, algorithms and sample rates; `experiments/` has some.
-/// The same experiment gives the same numbers on every machine: time is simulated.
+/// Time is simulated: the same experiment gives the same numbers every time, on slow machines and fast ones.
 #[derive(ClapArgs)]
 #[command(after_help = "Example:
-  frameless compare experiments/figures.toml --out out")]
+  frameless compare experiments/figures.toml --out out/figures")]
 pub(crate) struct CompareArgs {
     /// The experiment, a TOML file
     pub(crate) experiment: PathBuf,
 
-    /// The folder for results, report and video
+    /// The folder for numbers, curves, pictures and video; an earlier comparison there is replaced
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
 }

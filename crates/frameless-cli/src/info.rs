@@ -1,20 +1,20 @@
 //! `frameless info`: what is in a scene.
 
-use std::fmt::Write;
-
 use frameless_scene::{
     AfterEnd, Camera, Geometry, Image, Light, LightKind, Mesh, Projection, Scene, Target,
 };
 
 use crate::args::InfoArgs;
 use crate::failure::Failure;
-use crate::{input, output};
+use crate::{input, logger, output};
 
 /// Bytes in a mebibyte.
 const MIB: f64 = 1_048_576.0;
 
 /// Load the scene and tell.
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
+    // Warnings stand in the list below.
+    logger::silence();
     let scene = input::scene(&args.scene)?;
     Ok(output::print(&describe(&scene))?)
 }
@@ -84,7 +84,7 @@ fn mesh_bytes(mesh: &Mesh) -> usize {
 
 fn bounds(scene: &Scene) -> String {
     match scene.bounds_at(&scene.state_at(0.0)) {
-        Some(bounds) => format!("bounds      {} to {} m, at 0 s", bounds.min, bounds.max),
+        Some(bounds) => format!("bounds      {:.3} to {:.3} m, at 0 s", bounds.min, bounds.max),
         None => "bounds      nothing to be seen".into(),
     }
 }
@@ -121,7 +121,7 @@ fn light(light: &Light) -> String {
         LightKind::Directional => ("directional", "W/m²"),
         LightKind::Spot { .. } => ("spot", "W/sr"),
     };
-    format!("{kind}, {} {unit}", light.intensity)
+    format!("{kind}, {:.3} {unit}", light.intensity)
 }
 
 fn motion(scene: &Scene) -> String {
@@ -133,7 +133,6 @@ fn motion(scene: &Scene) -> String {
         AfterEnd::Repeat => "then again",
         AfterEnd::Hold => "then still",
     };
-    let mut text = format!("{:.3} s, {after_end}; channels:", animation.duration_secs);
     let mut counts: Vec<(&str, usize)> = Vec::new();
     for channel in &animation.channels {
         let name = driven(channel.target);
@@ -142,11 +141,9 @@ fn motion(scene: &Scene) -> String {
             None => counts.push((name, 1)),
         }
     }
-    for (name, count) in counts {
-        // Writing to a string cannot fail.
-        let _ = write!(text, " {count} {name}");
-    }
-    text
+    let counts: Vec<String> =
+        counts.iter().map(|(name, count)| format!("{count} {name}")).collect();
+    format!("{:.3} s, {after_end}; channels: {}", animation.duration_secs, counts.join(", "))
 }
 
 fn driven(target: Target) -> &'static str {

@@ -6,7 +6,6 @@ use anyhow::anyhow;
 use frameless_scene::{BUILTIN_NAMES, Limits, Scene};
 
 use crate::failure::Failure;
-use crate::output;
 
 /// The built-in scene of that name, else the file. A file in the way of a built-in name is reached as
 /// `./sphere`.
@@ -33,11 +32,4 @@ pub(crate) fn camera(scene: &Scene, number: u32) -> Result<u32, Failure> {
     Err(Failure::bad_input(anyhow!(
         "{name}: no camera {number}, the scene has {cameras}, counted from 0"
     )))
-}
-
-/// Say on standard error what was ignored or replaced, since the picture does not show it.
-pub(crate) fn tell_warnings(scene: &Scene) {
-    for warning in &scene.warnings {
-        eprintln!("warning: {}: {}", scene.name, output::printable(warning));
-    }
 }

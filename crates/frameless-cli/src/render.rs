@@ -17,7 +17,6 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     output::check_png_path(&args.out)?;
     let scene = input::scene(&args.scene)?;
     let view = ViewSource::Camera(input::camera(&scene, args.camera)?);
-    input::tell_warnings(&scene);
 
     let waiting = waiting();
     waiting.set_message(format!("building the BVH of {}", scene.name));

@@ -23,7 +23,6 @@ pub(crate) fn run(args: &TraceArgs) -> Result<(), Failure> {
     }
     let scene = input::scene(&args.scene)?;
     let view = ViewSource::Camera(input::camera(&scene, args.camera)?);
-    input::tell_warnings(&scene);
     let world = World::new(Arc::new(scene));
     let request = Request::centre(size.index(x, y));
     let steps =

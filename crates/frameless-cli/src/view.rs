@@ -22,7 +22,6 @@ pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
     }
     let mut scene = input::scene(&args.scene)?;
     let first = input::camera(&scene, args.camera)?;
-    input::tell_warnings(&scene);
     // The window begins with the first camera.
     scene.cameras.rotate_left(first as usize);
     let mut options = ViewOptions::new(Arc::new(scene));
