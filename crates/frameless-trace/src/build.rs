@@ -153,3 +153,38 @@ pub(crate) fn binary_by_median(boxes: &[Aabb]) -> Bvh2 {
     }
     binary
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stack_need(binary: &Bvh2) -> usize {
+        collapse(binary, &mut Vec::new(), |_| Child::leaf(0, 1))
+    }
+
+    /// Boxes that shrink towards the origin: clustering makes a list of them.
+    fn shrinking(count: i32) -> Vec<Aabb> {
+        (0..count)
+            .map(|k| 0.8f32.powi(k))
+            .map(|size| Aabb::new(Vec3A::splat(size), Vec3A::splat(1.1 * size)))
+            .collect()
+    }
+
+    #[test]
+    fn median_splits_never_need_more_stack_than_there_is() {
+        let boxes = shrinking(390);
+        let clustered = stack_need(&binary_by_clustering(&boxes));
+        assert!(clustered > STACK_PER_TREE, "{clustered}: the fallback would never be taken");
+        let halved = stack_need(&binary_by_median(&boxes));
+        assert!(halved <= 7 * 9, "{halved} for 390 boxes");
+    }
+
+    #[test]
+    fn all_boxes_alike_are_still_halved() {
+        let boxes = vec![Aabb::new(Vec3A::ZERO, Vec3A::ONE); 1_000];
+        assert!(stack_need(&binary_by_median(&boxes)) <= 7 * 10);
+        let mut members = binary_by_median(&boxes).primitive_indices;
+        members.sort_unstable();
+        assert!(members.into_iter().eq(0..1_000));
+    }
+}

@@ -206,7 +206,7 @@ fn degenerate_and_coincident_triangles() {
 
 #[test]
 fn a_tree_too_deep_for_the_stack_is_balanced() {
-    // Each triangle is half as far and half as large as the one before: clustering makes a list of it.
+    // Each triangle is nearer the origin and smaller than the one before, see the tests of `build`.
     let mut positions = Vec::new();
     for k in 0..400 {
         let size = 0.8f32.powi(k);
