@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use eframe::egui::{self, Align2, CentralPanel, Context, Key, Panel, Rect, Sense, Ui};
 use eframe::egui_wgpu::RenderState;
+use eframe::wgpu::DeviceType;
 use frameless::{Clock, Size};
 use frameless_scene::Scene;
 use frameless_trace::{CpuTracer, ViewSource, World};
@@ -16,6 +17,7 @@ use crate::load::{Loading, Outcome};
 use crate::messages::Messages;
 use crate::navigation::Motion;
 use crate::overlay::Drawn;
+use crate::pace::software_paint_secs;
 use crate::panel::{self, PanelState, Wish};
 use crate::picture::{PictureTexture, lay_out};
 use crate::render_thread::RenderThread;
@@ -37,6 +39,8 @@ enum Looking {
 pub(crate) struct App {
     scene: Arc<Scene>,
     looking: Looking,
+    // The scene's camera that was used last: where the user comes back to.
+    own_camera: u32,
     settings: Settings,
     transport: Transport,
     panel: PanelState,
@@ -88,14 +92,15 @@ impl App {
         Ok(App {
             scene: Arc::clone(world.scene()),
             looking: Looking::Through(0),
+            own_camera: 0,
             settings,
             transport: Transport::default(),
             panel: PanelState::default(),
             panels_shown: true,
             help_shown: false,
             render,
+            texture: PictureTexture::new(&target),
             target,
-            texture: PictureTexture::default(),
             status: None,
             sent_settings: settings,
             sent_size: size,
@@ -139,6 +144,16 @@ impl App {
         self.render.send(Command::WantPicture { memory: picture.rgba, paint_secs });
     }
 
+    /// What the last paint cost, without waiting for the display.
+    fn paint_secs(&self, context: &Context, frame: &eframe::Frame) -> f64 {
+        let toolkit = f64::from(frame.info().cpu_usage.unwrap_or(0.0));
+        let window_px = context.content_rect().size() * context.pixels_per_point();
+        match self.target.adapter.get_info().device_type {
+            DeviceType::Cpu => toolkit + software_paint_secs(f64::from(window_px.x * window_px.y)),
+            _ => toolkit,
+        }
+    }
+
     /// Begins to open a scene; what was being opened before is forgotten.
     fn open(&mut self, name: String, context: &Context, now_secs: f64) {
         let window = context.clone();
@@ -156,7 +171,7 @@ impl App {
             Some(Outcome::Failed(text)) => self.messages.error(text, now_secs),
             Some(Outcome::Ready(world)) => {
                 self.scene = Arc::clone(world.scene());
-                self.looking = Looking::Through(0);
+                (self.looking, self.own_camera) = (Looking::Through(0), 0);
                 self.render.send(Command::Scene(world));
                 self.messages.info(format!("opened {}", self.scene.name), now_secs);
             }
@@ -165,7 +180,7 @@ impl App {
     }
 
     fn look_through(&mut self, camera: u32) {
-        self.looking = Looking::Through(camera);
+        (self.looking, self.own_camera) = (Looking::Through(camera), camera);
         self.render.send(Command::View(ViewChoice::Camera(camera)));
     }
 
@@ -216,7 +231,7 @@ impl App {
             self.panels_shown = !self.panels_shown;
         }
         if pressed(Key::Home) {
-            self.look_through(0);
+            self.look_through(self.own_camera);
         }
         let digits = [Key::Num0, Key::Num1, Key::Num2, Key::Num3, Key::Num4];
         for (key, overlay) in digits.into_iter().zip(Overlay::ALL) {
@@ -244,7 +259,7 @@ impl App {
             Looking::Free(_) => None,
         };
         let frame = theme::panel_frame();
-        let side = Panel::right("settings").exact_size(250.0).resizable(false).frame(frame);
+        let side = Panel::right("settings").exact_size(272.0).resizable(false).frame(frame);
         let wish = side.show(ui, |ui| {
             panel::show(ui, &mut self.panel, &mut self.settings, &self.scene, camera)
         });
@@ -269,12 +284,12 @@ impl App {
         let place_px = place.size() * pixels_per_point;
         self.send_size(self.settings.picture.size_in([place_px.x as u32, place_px.y as u32]));
         if response.double_clicked() {
-            self.look_through(0);
+            self.look_through(self.own_camera);
         }
         let size = self.texture.size().unwrap_or(self.sent_size);
         let drawn = lay_out(place, size, pixels_per_point);
         let keys = !ui.ctx().egui_wants_keyboard_input();
-        let motion = ui.input(|input| Motion::read(&response, input, keys));
+        let motion = Motion::read(&response, keys);
         self.steer(&motion, drawn.height());
         self.texture.paint(ui.painter(), drawn);
         self.write_over(ui, place.shrink(10.0), now_secs);
@@ -292,7 +307,8 @@ impl App {
         let painter = ui.painter();
         let mut free = place;
         if let Some(status) = &self.status {
-            let lines = hud::lines(status, self.sent_size, &self.scene);
+            let size = self.texture.size().unwrap_or(self.sent_size);
+            let lines = hud::lines(status, size, &self.scene);
             let lines: Vec<Line> = lines.into_iter().map(Line::plain).collect();
             free = hud::below(free, hud::paint(painter, Align2::LEFT_TOP, free, &lines));
             match &status.overlay {
@@ -325,15 +341,15 @@ impl eframe::App for App {
     fn ui(&mut self, ui: &mut Ui, frame: &mut eframe::Frame) {
         let context = ui.ctx().clone();
         let now_secs = context.input(|input| input.time);
-        let paint_secs = f64::from(frame.info().cpu_usage.unwrap_or(0.0));
+        let paint_secs = self.paint_secs(&context, frame);
         self.receive(now_secs, paint_secs);
         self.receive_loaded(now_secs);
         self.messages.receive(now_secs);
         self.dropped_files(&context, now_secs);
         self.keys(&context);
         self.panels(ui, now_secs);
-        let backdrop = egui::Frame::NONE.fill(theme::BACKDROP);
-        CentralPanel::default().frame(backdrop).show(ui, |ui| self.picture(ui, now_secs));
+        let bare = egui::Frame::NONE;
+        CentralPanel::default().frame(bare).show(ui, |ui| self.picture(ui, now_secs));
         if self.help_shown {
             help::show(&context, &mut self.help_shown);
         }
@@ -343,6 +359,11 @@ impl eframe::App for App {
         }
         self.timed.act(&context, now_secs);
         context.request_repaint_after_secs(WAKE_AT_LEAST_SECS);
+    }
+
+    /// Behind everything: clearing is free, painting rectangles is not where a CPU does it.
+    fn clear_color(&self, _: &egui::Visuals) -> [f32; 4] {
+        theme::GROUND.to_normalized_gamma_f32()
     }
 
     fn on_exit(&mut self) {

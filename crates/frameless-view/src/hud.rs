@@ -92,8 +92,12 @@ pub(crate) fn grouped(number: f64) -> String {
     written
 }
 
+/// Milliseconds; seconds from ten of them on.
 fn millis(secs: f64) -> String {
-    format!("{} ms", grouped(1000.0 * secs))
+    match secs {
+        10.0.. => format!("{} s", grouped(secs)),
+        _ => format!("{} ms", grouped(1000.0 * secs)),
+    }
 }
 
 // A file may say anything in its names; the HUD has room for this much.
@@ -140,6 +144,14 @@ mod tests {
                 "no light: added one",
                 "2 warnings"
             ]
+        );
+    }
+
+    #[test]
+    fn long_times_are_in_seconds() {
+        assert_eq!(
+            [0.0, 0.0114, 9.9, 12_345.6].map(millis),
+            ["0 ms", "11 ms", "9,900 ms", "12,346 s"]
         );
     }
 

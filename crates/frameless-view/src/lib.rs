@@ -55,7 +55,12 @@ pub fn run(options: ViewOptions) -> anyhow::Result<()> {
         .with_inner_size(vec2(width, height))
         .with_min_inner_size(vec2(480.0, 320.0))
         .with_drag_and_drop(true);
-    let native = eframe::NativeOptions { viewport: window, ..Default::default() };
+    let native = eframe::NativeOptions {
+        viewport: window,
+        // The picture has the display's 8 bits already, and noise over every pixel is dear in software.
+        dithering: false,
+        ..Default::default()
+    };
     let create: eframe::AppCreator<'_> = Box::new(move |context| {
         Ok(Box::new(app::App::new(context, world, options)?) as Box<dyn eframe::App>)
     });

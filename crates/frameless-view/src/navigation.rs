@@ -31,8 +31,9 @@ impl Motion {
     const STILL: Motion = Motion { orbit: Vec2::ZERO, pan: Vec2::ZERO, zoom: 1.0, fly: Vec3::ZERO };
 
     /// Of the pointer on the picture and, while no text is being typed, of the keys.
-    pub(crate) fn read(picture: &Response, input: &InputState, keys: bool) -> Motion {
+    pub(crate) fn read(picture: &Response, keys: bool) -> Motion {
         let mut motion = Motion::STILL;
+        // A response asks the context for the input itself: never within `input`, whose lock it would wait for.
         if picture.dragged_by(PointerButton::Primary) {
             motion.orbit = picture.drag_delta();
         } else if picture.dragged_by(PointerButton::Secondary)
@@ -40,19 +41,16 @@ impl Motion {
         {
             motion.pan = picture.drag_delta();
         }
-        if picture.hovered() {
-            let points = input.smooth_scroll_delta().y;
-            motion.zoom = (-points * ZOOM_PER_POINT).exp() / input.zoom_delta();
-        }
-        if keys && !input.modifiers.command {
-            let axis = |more, less| {
-                f32::from(i8::from(input.key_down(more)) - i8::from(input.key_down(less)))
-            };
-            let per_sec = FLY_PER_SEC[usize::from(input.modifiers.shift)];
-            let step = per_sec * input.stable_dt.min(LONGEST_STEP_SECS);
-            motion.fly =
-                step * Vec3::new(axis(Key::D, Key::A), axis(Key::E, Key::Q), axis(Key::S, Key::W));
-        }
+        let hovered = picture.hovered();
+        picture.ctx.input(|input| {
+            if hovered {
+                let points = input.smooth_scroll_delta().y;
+                motion.zoom = (-points * ZOOM_PER_POINT).exp() / input.zoom_delta();
+            }
+            if keys && !input.modifiers.command {
+                motion.fly = flight(input);
+            }
+        });
         motion
     }
 
@@ -78,6 +76,14 @@ impl Motion {
             camera.fly(self.fly);
         }
     }
+}
+
+fn flight(input: &InputState) -> Vec3 {
+    let axis =
+        |more, less| f32::from(i8::from(input.key_down(more)) - i8::from(input.key_down(less)));
+    let per_sec = FLY_PER_SEC[usize::from(input.modifiers.shift)];
+    let step = per_sec * input.stable_dt.min(LONGEST_STEP_SECS);
+    step * Vec3::new(axis(Key::D, Key::A), axis(Key::E, Key::Q), axis(Key::S, Key::W))
 }
 
 #[cfg(test)]

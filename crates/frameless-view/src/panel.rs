@@ -1,6 +1,8 @@
 //! The panel at the side: what can be set.
 
-use eframe::egui::{ComboBox, Key, RichText, ScrollArea, Slider, TextEdit, Ui};
+use eframe::egui::{
+    Align, ComboBox, Key, Layout, RichText, ScrollArea, Slider, TextEdit, Ui, Widget, vec2,
+};
 use frameless::{DEFAULT_TILE, DEFAULT_W_D, SamplerKind, Size};
 use frameless_scene::Scene;
 
@@ -80,6 +82,24 @@ fn section(ui: &mut Ui, title: &str) {
     }
 }
 
+/// A label in a column of its own, and a widget beside it.
+fn row(ui: &mut Ui, label: &str, hint: &str, widget: impl Widget) {
+    const LABEL_WIDTH: f32 = 58.0;
+    ui.horizontal(|ui| {
+        let column = vec2(LABEL_WIDTH, ui.spacing().interact_size.y);
+        ui.allocate_ui_with_layout(column, Layout::left_to_right(Align::Center), |ui| {
+            ui.set_min_width(LABEL_WIDTH);
+            ui.label(label).on_hover_text(hint);
+        });
+        ui.add(widget).on_hover_text(hint);
+    });
+}
+
+/// Shows two decimals and keeps all: a slider that rounds would change what the command line has set.
+fn fraction(slider: Slider<'_>) -> Slider<'_> {
+    slider.custom_formatter(|value, _| format!("{value:.2}"))
+}
+
 fn scene_part(
     ui: &mut Ui,
     state: &mut PanelState,
@@ -89,17 +109,18 @@ fn scene_part(
     let mut wish = None;
     ui.heading(&scene.name);
     let selected = camera.map_or("free camera".to_owned(), |camera| camera_name(scene, camera));
-    ComboBox::from_id_salt("camera").selected_text(selected).width(200.0).truncate().show_ui(
-        ui,
-        |ui| {
+    ComboBox::from_id_salt("camera")
+        .selected_text(selected)
+        .width(ui.available_width())
+        .truncate()
+        .show_ui(ui, |ui| {
             for index in 0..scene.cameras.len() as u32 {
                 let chosen = camera == Some(index);
                 if ui.selectable_label(chosen, camera_name(scene, index)).clicked() {
                     wish = Some(Wish::Camera(index));
                 }
             }
-        },
-    );
+        });
     ui.horizontal(|ui| {
         let hint = "path of a .glb or .gltf";
         let field = TextEdit::singleline(&mut state.path).hint_text(hint).desired_width(140.0);
@@ -123,19 +144,19 @@ fn sampler_part(ui: &mut Ui, state: &mut PanelState, settings: &mut Settings) {
     if matches!(settings.sampler, SamplerKind::Change { .. }) {
         state.change = settings.sampler;
     }
-    ComboBox::from_id_salt("sampler").selected_text(settings.sampler.name()).width(200.0).show_ui(
-        ui,
-        |ui| {
+    ComboBox::from_id_salt("sampler")
+        .selected_text(settings.sampler.name())
+        .width(ui.available_width())
+        .show_ui(ui, |ui| {
             for kind in [SamplerKind::Random, SamplerKind::Permutation, state.change] {
                 ui.selectable_value(&mut settings.sampler, kind, kind.name());
             }
-        },
-    );
+        });
     if let SamplerKind::Change { w_d, tile } = &mut settings.sampler {
-        ui.add(Slider::new(w_d, 0.0..=1.0).fixed_decimals(2).text("w_d"))
-            .on_hover_text(format!("weight of change against age ({DEFAULT_W_D})"));
-        ui.add(Slider::new(tile, 1..=64).logarithmic(true).text("tile px"))
-            .on_hover_text(format!("side of a tile in pixels ({DEFAULT_TILE})"));
+        let hint = format!("weight of change against age; {DEFAULT_W_D} unless set");
+        row(ui, "w_d", &hint, fraction(Slider::new(w_d, 0.0..=1.0)));
+        let hint = format!("side of a tile in pixels; {DEFAULT_TILE} unless set");
+        row(ui, "tile", &hint, Slider::new(tile, 1..=64).logarithmic(true).suffix(" px"));
     }
 }
 
@@ -144,13 +165,13 @@ const BUDGETS: std::ops::RangeInclusive<f64> = 1e3..=1e8;
 
 fn budget_part(ui: &mut Ui, state: &mut PanelState, settings: &mut Settings) {
     let mut limited = settings.samples_per_sec.is_some();
-    ui.checkbox(&mut limited, "at most");
+    ui.checkbox(&mut limited, "at most so many samples/s");
     let per_sec = settings.samples_per_sec.as_mut().unwrap_or(&mut state.samples_per_sec);
-    let slider = Slider::new(per_sec, BUDGETS)
-        .logarithmic(true)
-        .custom_formatter(|per_sec, _| metric(per_sec))
-        .text("samples/s");
-    ui.add_enabled(limited, slider);
+    ui.add_enabled_ui(limited, |ui| {
+        let slider = Slider::new(per_sec, BUDGETS);
+        let slider = slider.logarithmic(true).custom_formatter(|per_sec, _| metric(per_sec));
+        row(ui, "rate", "samples per second", slider);
+    });
     state.samples_per_sec = *per_sec;
     settings.samples_per_sec = limited.then_some(state.samples_per_sec);
 }
@@ -165,22 +186,22 @@ fn metric(number: f64) -> String {
 }
 
 fn picture_part(ui: &mut Ui, settings: &mut Settings) {
-    ui.add(Slider::new(&mut settings.exposure_stops, -8.0..=8.0).fixed_decimals(1).text("stops"))
-        .on_hover_text("exposure: brighter by this power of two");
+    let slider = fraction(Slider::new(&mut settings.exposure_stops, -8.0..=8.0));
+    row(ui, "exposure", "in stops: brighter by this power of two", slider);
     let fixed = [(320, 240), (512, 384), (640, 480), (1024, 768), (1280, 720), (1920, 1080)];
     let fixed = fixed.map(|(width, height)| PictureSize::Fixed(Size::new(width, height)));
     let window = match settings.picture {
         window @ PictureSize::Window { .. } => window,
         PictureSize::Fixed(_) => PictureSize::default(),
     };
-    ComboBox::from_id_salt("size").selected_text(size_name(settings.picture)).width(200.0).show_ui(
-        ui,
-        |ui| {
+    ComboBox::from_id_salt("size")
+        .selected_text(size_name(settings.picture))
+        .width(ui.available_width())
+        .show_ui(ui, |ui| {
             for size in std::iter::once(window).chain(fixed) {
                 ui.selectable_value(&mut settings.picture, size, size_name(size));
             }
-        },
-    );
+        });
 }
 
 fn size_name(size: PictureSize) -> String {

@@ -1,29 +1,52 @@
 //! The picture as a texture, and where it lies in the window.
+//!
+//! Drawn by a shader of its own: the window toolkit's costs a software driver about 100 ns per pixel (it evaluates all
+//! branches for all pixels, manual filtering with integer divisions among them).
 
-use eframe::egui::{Painter, Pos2, Rect, TextureId, pos2, vec2};
-use eframe::egui_wgpu::RenderState;
+use eframe::egui::{PaintCallbackInfo, Painter, Rect, pos2, vec2};
+use eframe::egui_wgpu::{Callback, CallbackResources, CallbackTrait, RenderState};
 use eframe::wgpu;
 use frameless::Size;
 
 use crate::command::Picture;
 
-/// A texture of the picture's size, written once per refresh and nothing else.
-#[derive(Default)]
+/// A texture of the picture's size, written once per refresh, and what draws it.
 pub(crate) struct PictureTexture {
+    pipeline: wgpu::RenderPipeline,
+    sampler: wgpu::Sampler,
+    format: wgpu::TextureFormat,
+    // None until the first picture.
     current: Option<Uploaded>,
 }
 
 struct Uploaded {
     size: Size,
     texture: wgpu::Texture,
-    id: TextureId,
+    bind_group: wgpu::BindGroup,
 }
 
 impl PictureTexture {
+    /// Nothing to show yet.
+    pub(crate) fn new(target: &RenderState) -> PictureTexture {
+        // Enlarged, pixels stay squares; reduced, none of them vanishes.
+        let sampler = target.device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some("picture"),
+            mag_filter: wgpu::FilterMode::Nearest,
+            min_filter: wgpu::FilterMode::Linear,
+            ..Default::default()
+        });
+        // The picture is encoded already. A target that encodes what is written needs it decoded when it is read.
+        let format = match target.target_format.is_srgb() {
+            true => wgpu::TextureFormat::Rgba8UnormSrgb,
+            false => wgpu::TextureFormat::Rgba8Unorm,
+        };
+        PictureTexture { pipeline: pipeline(target), sampler, format, current: None }
+    }
+
     /// Hands the picture to the graphics driver. Kept until the next one.
     pub(crate) fn upload(&mut self, target: &RenderState, picture: &Picture) {
         let kept = self.current.take().filter(|current| current.size == picture.size);
-        let current = kept.unwrap_or_else(|| Uploaded::new(target, picture.size));
+        let current = kept.unwrap_or_else(|| self.allocate(&target.device, picture.size));
         let Size { width, height } = picture.size;
         target.queue.write_texture(
             current.texture.as_image_copy(),
@@ -41,19 +64,17 @@ impl PictureTexture {
     /// Draws the picture, if there is one yet.
     pub(crate) fn paint(&self, painter: &Painter, rect: Rect) {
         let Some(current) = &self.current else { return };
-        let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
-        painter.image(current.id, rect, whole, eframe::egui::Color32::WHITE);
+        let draw = Draw { pipeline: self.pipeline.clone(), bind_group: current.bind_group.clone() };
+        painter.add(Callback::new_paint_callback(rect, draw));
     }
 
     /// Width and height of the picture that is shown.
     pub(crate) fn size(&self) -> Option<Size> {
         self.current.as_ref().map(|current| current.size)
     }
-}
 
-impl Uploaded {
-    fn new(target: &RenderState, size: Size) -> Uploaded {
-        let texture = target.device.create_texture(&wgpu::TextureDescriptor {
+    fn allocate(&self, device: &wgpu::Device, size: Size) -> Uploaded {
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("picture"),
             size: wgpu::Extent3d {
                 width: size.width,
@@ -63,24 +84,71 @@ impl Uploaded {
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
-            // Not Srgb: the window blends encoded values, and the picture is encoded already.
-            format: wgpu::TextureFormat::Rgba8Unorm,
+            format: self.format,
             usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         });
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        // Enlarged, pixels stay squares; reduced, none of them vanishes.
-        let sampler = wgpu::SamplerDescriptor {
-            mag_filter: wgpu::FilterMode::Nearest,
-            min_filter: wgpu::FilterMode::Linear,
-            ..Default::default()
-        };
-        let id = target.renderer.write().register_native_texture_with_sampler_options(
-            &target.device,
-            &view,
-            sampler,
-        );
-        Uploaded { size, texture, id }
+        let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("picture"),
+            layout: &self.pipeline.get_bind_group_layout(0),
+            entries: &[
+                wgpu::BindGroupEntry {
+                    binding: 0,
+                    resource: wgpu::BindingResource::TextureView(&view),
+                },
+                wgpu::BindGroupEntry {
+                    binding: 1,
+                    resource: wgpu::BindingResource::Sampler(&self.sampler),
+                },
+            ],
+        });
+        Uploaded { size, texture, bind_group }
+    }
+}
+
+fn pipeline(target: &RenderState) -> wgpu::RenderPipeline {
+    let shader = target.device.create_shader_module(wgpu::include_wgsl!("picture.wgsl"));
+    target.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some("picture"),
+        layout: None,
+        vertex: wgpu::VertexState {
+            module: &shader,
+            entry_point: Some("corner"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: None,
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: &shader,
+            entry_point: Some("pixel"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            targets: &[Some(target.target_format.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
+
+/// One refresh's drawing of the picture.
+struct Draw {
+    pipeline: wgpu::RenderPipeline,
+    bind_group: wgpu::BindGroup,
+}
+
+impl CallbackTrait for Draw {
+    fn paint(
+        &self,
+        _: PaintCallbackInfo,
+        pass: &mut wgpu::RenderPass<'static>,
+        _: &CallbackResources,
+    ) {
+        // The viewport is the callback's rectangle already.
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.bind_group, &[]);
+        pass.draw(0..3, 0..1);
     }
 }
 

@@ -4,10 +4,8 @@ use eframe::egui::{
     self, Color32, CornerRadius, FontFamily, FontId, Margin, Stroke, TextStyle, Theme, vec2,
 };
 
-/// Behind the picture.
-pub(crate) const BACKDROP: Color32 = Color32::from_rgb(10, 11, 13);
-/// Behind panels.
-pub(crate) const PANEL: Color32 = Color32::from_rgb(22, 24, 29);
+/// Behind everything.
+pub(crate) const GROUND: Color32 = Color32::from_rgb(17, 18, 22);
 /// What is chosen, and where a slider stands: the heat maps' orange.
 pub(crate) const ACCENT: Color32 = Color32::from_rgb(240, 128, 48);
 /// Something went wrong.
@@ -32,12 +30,12 @@ pub(crate) fn apply(context: &egui::Context) {
         style.spacing.item_spacing = vec2(8.0, 6.0);
         style.spacing.interact_size.y = 22.0;
         style.spacing.button_padding = vec2(8.0, 3.0);
-        style.spacing.slider_width = 120.0;
+        style.spacing.slider_width = 110.0;
         // Nothing slides or fades: every extra repaint is taken from the picture.
         style.animation_time = 0.0;
         let visuals = &mut style.visuals;
-        visuals.panel_fill = PANEL;
-        visuals.window_fill = PANEL;
+        visuals.panel_fill = GROUND;
+        visuals.window_fill = GROUND;
         visuals.extreme_bg_color = Color32::from_rgb(13, 14, 17);
         visuals.selection.bg_fill = ACCENT.gamma_multiply(0.55);
         visuals.selection.stroke = Stroke::new(1.0, Color32::WHITE);
@@ -56,7 +54,7 @@ pub(crate) fn apply(context: &egui::Context) {
     });
 }
 
-/// The frame of the side panel and the bar below the picture.
+/// The frame of the side panel and the bar below the picture; the ground shows through.
 pub(crate) fn panel_frame() -> egui::Frame {
-    egui::Frame::NONE.fill(PANEL).inner_margin(Margin::symmetric(12, 8))
+    egui::Frame::NONE.inner_margin(Margin::symmetric(12, 8))
 }

@@ -1,6 +1,6 @@
 //! The bar below the picture: play, scrub, speed.
 
-use eframe::egui::{DragValue, Key, Slider, Ui};
+use eframe::egui::{Button, DragValue, Key, Slider, Ui, vec2};
 
 use crate::command::Command;
 
@@ -32,8 +32,10 @@ impl Transport {
     ) -> Vec<Command<W>> {
         let mut commands = Vec::new();
         ui.horizontal(|ui| {
-            let label = if self.playing { "⏸" } else { "▶" };
-            if ui.button(label).on_hover_text("space").clicked() {
+            // As wide as the wider word, so that nothing moves.
+            let label = if self.playing { "Pause" } else { "Play" };
+            let button = Button::new(label).min_size(vec2(58.0, 0.0));
+            if ui.add(button).on_hover_text("space").clicked() {
                 commands.push(self.toggle());
             }
             if duration_secs <= 0.0 {
@@ -46,7 +48,9 @@ impl Transport {
             }
             let mut at = scene_secs.rem_euclid(duration_secs);
             ui.spacing_mut().slider_width = (ui.available_width() - 80.0).max(60.0);
-            let slider = Slider::new(&mut at, 0.0..=duration_secs).fixed_decimals(2).suffix(" s");
+            // Formatted, not rounded: a slider that rounds its value reports a change in every refresh.
+            let slider = Slider::new(&mut at, 0.0..=duration_secs);
+            let slider = slider.custom_formatter(|secs, _| format!("{secs:.2}")).suffix(" s");
             if ui.add(slider).changed() {
                 commands.push(Command::Seek(at));
             }
