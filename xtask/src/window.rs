@@ -26,6 +26,8 @@ pub(crate) fn smoke(program: &Path, out: &Path) -> Result<String> {
     view.args(["view", "sphere", "--size", "320x240", "--after", SECS_UNTIL_SCREENSHOT]);
     view.arg("--screenshot").arg(&screenshot);
     view.env("DISPLAY", &screen.display).env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
+    // Without one, libraries of the desktop complain on every start.
+    view.env("XDG_RUNTIME_DIR", out);
     let answer = output_within(&mut view, LIMIT)?;
     ensure!(
         answer.status.success(),
