@@ -35,21 +35,21 @@ fn main() -> Result<(), Failure> {
         scene.instances.len(),
         scene.lights.len()
     );
-    println!("threads  order      bounces  M samples/s: median (least, most)");
+    let unlit = Scene { lights: Vec::new(), ..Scene::clone(scene) };
+    let unlit = Arc::new(World::new(Arc::new(unlit)));
+    println!("threads  order      lights  M samples/s: median (least, most)");
     for threads in [1, 2] {
         for is_clustered in [false, true] {
-            for max_depth in [0, 4] {
-                let settings = Settings { max_depth, ..Settings::default() };
+            // Without lights a sample is a primary ray (and mirrors) and its shading; the difference is the shadow rays.
+            for (world, lights) in [(&world, "on"), (&unlit, "none")] {
                 let view = ViewSource::Camera(0);
-                let mut tracer = CpuTracer::new(world.clone(), view, settings, threads);
+                let mut tracer = CpuTracer::new(world.clone(), view, Settings::default(), threads);
                 let mut rates: Vec<f64> =
                     (0..ROUNDS).map(|_| samples_per_sec(&mut tracer, size, is_clustered)).collect();
                 rates.sort_by(f64::total_cmp);
                 let [least, median, most] = [0, ROUNDS / 2, ROUNDS - 1].map(|k| rates[k] * 1e-6);
                 let order = if is_clustered { "clustered" } else { "random" };
-                println!(
-                    "{threads:7}  {order:9}  {max_depth:7}  {median:.3} ({least:.3}, {most:.3})"
-                );
+                println!("{threads:7}  {order:9}  {lights:6}  {median:.3} ({least:.3}, {most:.3})");
             }
         }
     }
