@@ -81,7 +81,7 @@ impl App {
         let tracer = CpuTracer::new(
             Arc::clone(&world),
             ViewSource::Camera(0),
-            options.tracing.clone(),
+            options.tracing,
             options.threads,
         );
         let size = settings.picture.size_in(options.window.map(|side| side as u32));

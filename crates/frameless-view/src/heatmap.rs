@@ -27,8 +27,7 @@ impl Scale {
             Scale::Logarithmic { low, .. } if value <= low => 0.0,
             Scale::Logarithmic { low, high } => (value / low).ln() / (high / low).ln(),
         };
-        // max before min: `max` returns the number where one side is NaN.
-        position.max(0.0).min(1.0)
+        if position.is_nan() { 0.0 } else { position.clamp(0.0, 1.0) }
     }
 
     /// Values worth a tick, with their position in [0, 1], from dark to bright.
@@ -94,10 +93,10 @@ pub(crate) fn colour(position: f32) -> [u8; 4] {
 /// Polynomial of degree 6 fitted to it: M. Zucker, shadertoy.com/view/WlfXRN, CC0.
 fn inferno(t: f32) -> [f32; 3] {
     const COEFFICIENTS: [[f32; 3]; 7] = [
-        [0.000_218_94, 0.001_651_00, -0.019_480_90],
+        [0.000_218_94, 0.001_651, -0.019_480_9],
         [0.106_513_42, 0.563_956_44, 3.932_712_4],
         [11.602_493, -3.972_854, -15.942_394],
-        [-41.703_996, 17.436_399, 44.354_145],
+        [-41.703_996, 17.436_4, 44.354_145],
         [77.162_94, -33.402_36, -81.807_31],
         [-71.319_43, 32.626_064, 73.209_52],
         [25.131_126, -12.242_669, -23.070_325],

@@ -84,7 +84,7 @@ pub(crate) fn grouped(number: f64) -> String {
     let digits = (number.max(0.0).round() as u64).to_string();
     let mut written = String::new();
     for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i) % 3 == 0 {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
             written.push(',');
         }
         written.push(digit);

@@ -29,6 +29,8 @@ mod settings;
 mod shown;
 mod snapshot;
 mod stage;
+#[cfg(test)]
+mod test_stage;
 mod theme;
 mod timed;
 mod transport;

@@ -109,3 +109,63 @@ fn run<S: Stage>(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use frameless::{Clock, Size};
+
+    use super::*;
+    use crate::command::Picture;
+    use crate::settings::Settings;
+    use crate::test_stage::Plain;
+
+    fn start() -> RenderThread<f32> {
+        let (size, settings) = (Size::new(16, 12), Settings::default());
+        let session = Session::new(size, Clock::real(), settings, 1, Plain::new(1.0));
+        RenderThread::start(session, || {}).unwrap()
+    }
+
+    fn next(thread: &RenderThread<f32>) -> Result<Report, Ended> {
+        loop {
+            match thread.report()? {
+                Some(report) => return Ok(report),
+                None => std::thread::yield_now(),
+            }
+        }
+    }
+
+    fn picture(thread: &RenderThread<f32>) -> Picture {
+        thread.send(Command::WantPicture { memory: Vec::new(), paint_secs: 0.0 });
+        match next(thread) {
+            Ok(Report::Picture(picture)) => picture,
+            other => panic!("no picture: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_wish_is_answered_once_and_the_loop_goes_on() {
+        let thread = start();
+        while picture(&thread).status.ages.untraced > 0 {}
+        assert!(picture(&thread).rgba.iter().all(|&pixel| pixel == [255; 4]));
+        std::thread::sleep(std::time::Duration::from_millis(60));
+        assert!(matches!(thread.report(), Ok(None)), "nobody asked");
+    }
+
+    #[test]
+    fn a_renderer_that_fails_is_said_and_the_picture_stays() {
+        let thread = start();
+        while picture(&thread).status.ages.untraced > 0 {}
+        thread.send(Command::Scene(f32::NAN));
+        let Ok(Report::Error(text)) = next(&thread) else { panic!("no error") };
+        assert!(text.contains("not finite"), "{text}");
+        assert!(picture(&thread).rgba.iter().all(|&pixel| pixel == [255; 4]));
+    }
+
+    #[test]
+    fn a_renderer_that_panics_ends_the_loop_and_not_the_window() {
+        let thread = start();
+        thread.send(Command::Scene(-1.0));
+        assert!(matches!(next(&thread), Err(Ended)));
+        thread.send(Command::Play(false));
+    }
+}

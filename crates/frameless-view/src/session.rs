@@ -139,56 +139,17 @@ impl Throughput {
 
 #[cfg(test)]
 mod tests {
-    use frameless::{Answer, Batch, Function, SamplerKind};
+    use frameless::SamplerKind;
 
     use super::*;
     use crate::overlay::Drawn;
-
-    /// A renderer of one colour per world; counts what it is told.
-    struct Plain {
-        grey: f32,
-        view: ViewChoice,
-        function: Function<fn(&Batch) -> Vec<[f32; 3]>>,
-    }
-
-    fn black(batch: &Batch) -> Vec<[f32; 3]> {
-        vec![[0.0; 3]; batch.requests.len()]
-    }
-
-    impl Tracer for Plain {
-        fn submit(&mut self, batch: Batch) {
-            self.function.submit(batch)
-        }
-
-        fn collect(&mut self, wait: bool) -> Option<Answer> {
-            let mut answer = self.function.collect(wait)?;
-            answer.rgb.fill([self.grey; 3]);
-            Some(answer)
-        }
-    }
-
-    impl Stage for Plain {
-        type World = f32;
-
-        fn set_view(&mut self, view: ViewChoice) {
-            self.view = view;
-        }
-
-        fn set_world(&mut self, grey: f32) {
-            self.grey = grey;
-        }
-    }
+    use crate::test_stage::Plain;
 
     /// A session with every pixel traced at least once.
     fn white_session() -> Session<Plain> {
-        let stage = Plain {
-            grey: 1.0,
-            view: ViewChoice::Camera(0),
-            function: Function::new(black as fn(&Batch) -> Vec<[f32; 3]>),
-        };
         let settings = Settings { sampler: SamplerKind::Permutation, ..Settings::default() };
         let clock = Clock::simulated(100_000.0);
-        let mut session = Session::new(Size::new(40, 30), clock, settings, 1, stage);
+        let mut session = Session::new(Size::new(40, 30), clock, settings, 1, Plain::new(1.0));
         run(&mut session, 0.1);
         assert_eq!(brightness(&mut session), 255.0);
         session

@@ -1,0 +1,47 @@
+//! A renderer for tests: one colour per world.
+
+use std::collections::VecDeque;
+
+use frameless::{Answer, Batch, Tracer};
+
+use crate::command::ViewChoice;
+use crate::session::Stage;
+
+/// Every pixel is this grey; remembers where it is to look from.
+pub(crate) struct Plain {
+    pub(crate) grey: f32,
+    pub(crate) view: ViewChoice,
+    answers: VecDeque<Answer>,
+}
+
+impl Plain {
+    pub(crate) fn new(grey: f32) -> Plain {
+        Plain { grey, view: ViewChoice::Camera(0), answers: VecDeque::new() }
+    }
+}
+
+impl Tracer for Plain {
+    /// # Panics
+    /// If the grey is negative.
+    fn submit(&mut self, batch: Batch) {
+        assert!(self.grey.is_nan() || self.grey >= 0.0, "a renderer that panics on purpose");
+        let rgb = vec![[self.grey; 3]; batch.requests.len()];
+        self.answers.push_back(Answer::to(batch, rgb, Vec::new()));
+    }
+
+    fn collect(&mut self, _wait: bool) -> Option<Answer> {
+        self.answers.pop_front()
+    }
+}
+
+impl Stage for Plain {
+    type World = f32;
+
+    fn set_view(&mut self, view: ViewChoice) {
+        self.view = view;
+    }
+
+    fn set_world(&mut self, grey: f32) {
+        self.grey = grey;
+    }
+}
