@@ -2,28 +2,59 @@
 
 use frameless::SamplerKind;
 
+use crate::contender::{Arena, Contender};
+use crate::contenders::{Framed, FramedSingle, Frameless, LowRes, OracleHold, Progressive};
+
 /// A way of making pictures from samples.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Algorithm {
     /// A frameless sampler, shown by `hold`.
     Frameless(SamplerKind),
+    /// `framed`: whole frames, double-buffered.
+    Framed,
+    /// `framed-single`: whole frames, visible while they are drawn.
+    FramedSingle,
+    /// `lowres60` and `lowres30`: one frame of fitting resolution every so many refreshes.
+    LowRes {
+        /// 1 or 2.
+        refreshes_per_frame: u32,
+    },
+    /// `progressive`: clear on any change, low resolution while things change, then accumulate.
+    Progressive,
+    /// `oracle-hold`: knows the ideal; the reference for held pictures.
+    OracleHold,
 }
 
+/// The algorithms without parameters.
+const PLAIN: [(&str, Algorithm); 6] = [
+    ("framed", Algorithm::Framed),
+    ("framed-single", Algorithm::FramedSingle),
+    ("lowres60", Algorithm::LowRes { refreshes_per_frame: 1 }),
+    ("lowres30", Algorithm::LowRes { refreshes_per_frame: 2 }),
+    ("progressive", Algorithm::Progressive),
+    ("oracle-hold", Algorithm::OracleHold),
+];
+
 impl Algorithm {
-    /// `random`, `permutation`, `change`; with parameters: `change(w_d=0.7,tile=8)`. A trailing `+hold` may be
-    /// written out.
+    /// `random`, `permutation`, `change`, `framed`, `framed-single`, `lowres60`, `lowres30`, `progressive`, `oracle-hold`; with
+    /// parameters: `change(w_d=0.7,tile=8)`. After a sampler `+hold` may be written out.
     ///
     /// # Errors
     /// What was wanted, if the name is not one of these.
     pub fn from_name(name: &str) -> Result<Algorithm, String> {
-        let plain = name.strip_suffix("+hold").unwrap_or(name);
-        let (head, parameters) = match plain.split_once('(') {
+        if let Some((_, algorithm)) = PLAIN.into_iter().find(|(plain, _)| *plain == name) {
+            return Ok(algorithm);
+        }
+        let sampler = name.strip_suffix("+hold").unwrap_or(name);
+        let (head, parameters) = match sampler.split_once('(') {
             Some((head, rest)) => (head, Some(rest)),
-            None => (plain, None),
+            None => (sampler, None),
         };
         let kind = SamplerKind::from_name(head).ok_or_else(|| {
-            let known = SamplerKind::ALL.map(|kind| kind.name()).join(", ");
-            format!("unknown algorithm {name:?}; there are: {known}")
+            let samplers = SamplerKind::ALL.map(|kind| kind.name());
+            let known: Vec<&str> =
+                samplers.into_iter().chain(PLAIN.map(|(name, _)| name)).collect();
+            format!("unknown algorithm {name:?}; there are: {}", known.join(", "))
         })?;
         match (kind, parameters) {
             (kind, None) => Ok(Algorithm::Frameless(kind)),
@@ -40,6 +71,24 @@ impl Algorithm {
                 format!("change(w_d={w_d},tile={tile})")
             }
             Algorithm::Frameless(kind) => kind.name().into(),
+            plain => {
+                let found = PLAIN.into_iter().find(|(_, algorithm)| algorithm == plain);
+                found.expect("every other algorithm is listed").0.into()
+            }
+        }
+    }
+
+    /// The algorithm at work, at time 0.
+    pub(crate) fn contender<'a>(&self, arena: Arena<'a>) -> Box<dyn Contender + 'a> {
+        match *self {
+            Algorithm::Frameless(kind) => Box::new(Frameless::new(arena, kind.build(arena.seed))),
+            Algorithm::Framed => Box::new(Framed::new(arena)),
+            Algorithm::FramedSingle => Box::new(FramedSingle::new(arena)),
+            Algorithm::LowRes { refreshes_per_frame } => {
+                Box::new(LowRes::new(arena, refreshes_per_frame))
+            }
+            Algorithm::Progressive => Box::new(Progressive::new(arena)),
+            Algorithm::OracleHold => Box::new(OracleHold::contender(arena)),
         }
     }
 }
@@ -68,7 +117,9 @@ mod tests {
 
     #[test]
     fn names_there_and_back() {
-        for name in ["random", "permutation", "change", "change(w_d=0.5,tile=8)"] {
+        let plain = PLAIN.map(|(name, _)| name);
+        let samplers = ["random", "permutation", "change", "change(w_d=0.5,tile=8)"];
+        for name in plain.into_iter().chain(samplers) {
             assert_eq!(Algorithm::from_name(name).expect(name).name(), name);
         }
         assert_eq!(

@@ -189,11 +189,8 @@ fn check(file: ExperimentFile, folder: &Path) -> Result<Experiment, String> {
     }
     let refreshes = (file.duration_secs * f64::from(file.display_hz)).round();
     let unscored = (file.unscored_secs * f64::from(file.display_hz)).round();
-    if !(refreshes >= 1.0
-        && refreshes <= LONGEST_RUN_REFRESHES
-        && unscored >= 0.0
-        && unscored < refreshes)
-    {
+    let is_possible = (1.0..=LONGEST_RUN_REFRESHES).contains(&refreshes) && unscored >= 0.0;
+    if !(is_possible && unscored < refreshes) {
         return Err(format!(
             "duration_secs must be at least one refresh, at most {LONGEST_RUN_REFRESHES} refreshes, and longer than \
              unscored_secs; got {} and {}",

@@ -6,6 +6,8 @@
 mod algorithm;
 mod camera_path;
 mod compare;
+mod contender;
+mod contenders;
 mod error;
 mod experiment;
 mod ideal;
@@ -21,6 +23,7 @@ pub use experiment::{Experiment, IDEAL, SceneSource, SceneSpec};
 
 pub use subject::{Subject, SubjectTracer};
 
+pub use contender::{Arena, Contender};
 pub use ideal::{Ideals, refresh_time};
 pub use run::{Cell, run};
 

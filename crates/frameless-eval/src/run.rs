@@ -1,8 +1,9 @@
 //! One run: one scene, one algorithm, one rate, one seed, against the ideal at every refresh.
 
-use frameless::{Canvas, Clock, Display, Engine, EngineError};
+use frameless::EngineError;
 
 use crate::algorithm::Algorithm;
+use crate::contender::Arena;
 use crate::experiment::Experiment;
 use crate::ideal::{Ideals, refresh_time};
 use crate::metrics::{Picture, mean, quantile, rmse, rmse_where};
@@ -33,25 +34,23 @@ pub fn run(
     ideals: &Ideals,
     look: &mut dyn FnMut(usize, &Picture),
 ) -> Result<RunResult, EngineError> {
-    let Algorithm::Frameless(kind) = &cell.algorithm;
-    let canvas = Canvas::from_picture(experiment.size, ideals.start.clone());
-    let clock = Clock::simulated(cell.samples_per_sec);
-    let mut engine = Engine::with_canvas(canvas, clock, kind.build(cell.seed), subject.tracer());
-
+    let mut contender = cell.algorithm.contender(Arena {
+        subject,
+        ideals,
+        size: experiment.size,
+        display_hz: experiment.display_hz,
+        samples_per_sec: cell.samples_per_sec,
+        seed: cell.seed,
+    });
+    let mut picture = Picture::new();
     let (mut whole, mut changed) = (Vec::new(), Vec::new());
     for (k, ideal) in ideals.pictures.iter().enumerate() {
-        engine.run_until(refresh_time(k, experiment.display_hz))?;
-        let picture = show(engine.canvas(), engine.display());
+        contender.show(refresh_time(k, experiment.display_hz), &mut picture)?;
         whole.push(rmse(&picture, ideal));
         changed.push(rmse_where(&ideals.changed[k], &picture, ideal));
         look(k, &picture);
     }
     Ok(summary(cell, experiment, whole, changed))
-}
-
-/// Reconstruction `hold` in full precision.
-fn show(canvas: &Canvas, display: &Display) -> Picture {
-    canvas.rgb().iter().map(|&rgb| display.encode(rgb)).collect()
 }
 
 fn summary(

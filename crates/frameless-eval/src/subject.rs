@@ -39,12 +39,30 @@ impl Subject {
     /// The whole picture at exactly `secs`, linear RGB, one sample per pixel at its centre: what an
     /// infinitely fast renderer would show.
     pub fn ideal(&self, secs: f64, size: Size) -> Vec<[f32; 3]> {
-        let moment = self.world.moment(secs);
         let requests: Vec<Request> = (0..size.pixels() as u32).map(Request::centre).collect();
-        self.trace(&moment, secs, size, &requests)
+        self.trace(secs, size, &requests)
     }
 
-    fn trace(&self, moment: &Moment, secs: f64, size: Size, requests: &[Request]) -> Vec<[f32; 3]> {
+    /// Linear RGB of any pixels at exactly `secs`.
+    pub fn trace(&self, secs: f64, size: Size, requests: &[Request]) -> Vec<[f32; 3]> {
+        self.trace_moment(&self.world.moment(secs), secs, size, requests)
+    }
+
+    /// Whether nothing that can be seen differs between two times: neither camera nor object nor light.
+    pub fn is_still(&self, a_secs: f64, b_secs: f64) -> bool {
+        let (a, b) = (self.world.moment(a_secs), self.world.moment(b_secs));
+        let same_state = a.state().world_from_node == b.state().world_from_node
+            && a.state().light_intensity == b.state().light_intensity;
+        same_state && self.view(&a, a_secs) == self.view(&b, b_secs)
+    }
+
+    fn trace_moment(
+        &self,
+        moment: &Moment,
+        secs: f64,
+        size: Size,
+        requests: &[Request],
+    ) -> Vec<[f32; 3]> {
         let view = self.view(moment, secs);
         let settings = Settings { surfaces: false, ..Settings::default() };
         let trace = |request: &Request| self.world.trace(moment, &view, size, request, &settings).0;
@@ -70,7 +88,7 @@ impl Tracer for SubjectTracer<'_> {
     fn submit(&mut self, batch: Batch) {
         let secs = batch.scene_secs;
         self.subject.world.update_moment(secs, &mut self.moment);
-        let rgb = self.subject.trace(&self.moment, secs, batch.size, &batch.requests);
+        let rgb = self.subject.trace_moment(&self.moment, secs, batch.size, &batch.requests);
         self.answer = Some(Answer::to(batch, rgb, Vec::new()));
     }
 

@@ -86,7 +86,7 @@ fn results_say_what_was_asked_and_change_beats_random() {
 
     let text = std::fs::read_to_string(out.join("results.json")).expect("written");
     let read: Results = serde_json::from_str(&text).expect("as documented");
-    assert_eq!(read, results);
+    assert!(read == results, "what was written is not what was returned");
     assert_eq!(results.runs.len(), 6);
     for run in &results.runs {
         assert_eq!((run.width, run.height, run.display_hz, run.refreshes), (64, 48, 60, 30));

@@ -26,10 +26,12 @@ impl OutputFolder {
         };
         let unwritable = |e| EvalError::unwritable(wanted, e);
         std::fs::create_dir_all(parent).map_err(unwritable)?;
-        let partial = tempfile::Builder::new()
-            .prefix(".frameless-partial-")
-            .tempdir_in(parent)
-            .map_err(unwritable)?;
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".frameless-partial-");
+        // Temporary folders are private unless told otherwise; this one is going to be the output.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
+        let partial = builder.tempdir_in(parent).map_err(unwritable)?;
         Ok(OutputFolder { wanted: wanted.to_path_buf(), partial })
     }
 

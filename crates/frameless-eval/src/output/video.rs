@@ -40,8 +40,8 @@ fn encode(
 ) -> Result<(), Box<dyn std::error::Error>> {
     let size = strip.size();
     let config = EncoderConfig::new()
-        .usage_type(UsageType::ScreenContentNonRealTime)
-        .rate_control_mode(RateControlMode::Quality)
+        .usage_type(UsageType::CameraVideoRealTime)
+        .rate_control_mode(RateControlMode::Off)
         .bitrate(BitRate::from_bps(BITS_PER_SEC))
         .max_frame_rate(FrameRate::from_hz(display_hz as f32))
         .qp(QpRange::new(10, WORST_QUANTIZER))
