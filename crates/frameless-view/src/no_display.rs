@@ -30,7 +30,12 @@ pub(crate) fn explain(error: &eframe::Error) -> anyhow::Error {
             "no display: the graphics driver cannot draw into a window ({error}); a software driver \
              (lavapipe, package mesa-vulkan-drivers) is enough; or {INSTEAD}"
         ),
-        error => anyhow::anyhow!("no display: cannot open a window ({error}); {INSTEAD}"),
+        error => {
+            // The window library puts its source file and line before the reason.
+            let text = error.to_string();
+            let reason = text.rsplit(": ").next().unwrap_or(&text);
+            anyhow::anyhow!("no display: cannot open a window ({reason}); {INSTEAD}")
+        }
     }
 }
 

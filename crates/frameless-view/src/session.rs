@@ -222,6 +222,31 @@ mod tests {
     }
 
     #[test]
+    fn encoding_what_is_new_is_encoding_all() {
+        let mut session = white_session();
+        for grey in [0.1, 0.7, 0.3] {
+            session.apply(Command::Scene(grey));
+            run(&mut session, 0.004);
+            let shown = session.picture(vec![[7; 4]; 3]).rgba;
+            assert_eq!(shown, frameless::hold(session.engine.canvas(), session.engine.display()));
+            assert!(shown.iter().any(|pixel| *pixel != shown[0]), "only part of it is new");
+        }
+    }
+
+    #[test]
+    fn resizing_there_and_back_between_two_pictures_shows_what_is_there() {
+        let mut session = white_session();
+        session.engine.tracer_mut().tracer.striped = true;
+        run(&mut session, 0.1);
+        session.picture(Vec::new());
+        // Same times afterwards, since a batch has one, but at other pixels.
+        session.apply(Command::Size(Size::new(30, 30)));
+        session.apply(Command::Size(Size::new(40, 30)));
+        let shown = session.picture(Vec::new()).rgba;
+        assert_eq!(shown, frameless::hold(session.engine.canvas(), session.engine.display()));
+    }
+
+    #[test]
     fn pausing_stops_the_scenes_time_and_not_the_loop() {
         let mut session = white_session();
         session.apply(Command::Play(false));

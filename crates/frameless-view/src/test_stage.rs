@@ -7,16 +7,17 @@ use frameless::{Answer, Batch, Tracer};
 use crate::command::ViewChoice;
 use crate::session::Stage;
 
-/// Every pixel is this grey; remembers where it is to look from.
+/// Every pixel is this grey, or every other column black; remembers where it is to look from.
 pub(crate) struct Plain {
     pub(crate) grey: f32,
+    pub(crate) striped: bool,
     pub(crate) view: ViewChoice,
     answers: VecDeque<Answer>,
 }
 
 impl Plain {
     pub(crate) fn new(grey: f32) -> Plain {
-        Plain { grey, view: ViewChoice::Camera(0), answers: VecDeque::new() }
+        Plain { grey, striped: false, view: ViewChoice::Camera(0), answers: VecDeque::new() }
     }
 }
 
@@ -25,7 +26,11 @@ impl Tracer for Plain {
     /// If the grey is negative.
     fn submit(&mut self, batch: Batch) {
         assert!(self.grey.is_nan() || self.grey >= 0.0, "a renderer that panics on purpose");
-        let rgb = vec![[self.grey; 3]; batch.requests.len()];
+        let grey = |pixel| match self.striped && batch.size.xy(pixel).0 % 2 == 1 {
+            true => [0.0; 3],
+            false => [self.grey; 3],
+        };
+        let rgb = batch.requests.iter().map(|request| grey(request.pixel)).collect();
         self.answers.push_back(Answer::to(batch, rgb, Vec::new()));
     }
 
