@@ -10,8 +10,8 @@ use super::textures::{ball, checker, hash};
 use super::world::{CAMERA_DISTANCE, LIGHT_INTENSITY, LIGHT_POSITION, World};
 use crate::{Channel, Scene, Target};
 
-/// Of the rolling sphere, in metres: 85 pixels of a picture with 384 rows.
-const SPHERE_RADIUS: f32 = 1.22;
+/// Of the rolling sphere, in metres: 60 pixels of a picture with 384 rows.
+const SPHERE_RADIUS: f32 = 0.86;
 /// Half the way of the rolling sphere, in metres.
 const SPHERE_REACH: f64 = 2.7;
 /// Seconds from one end of the way to the other: 3.6 m/s, 250 pixels of 384 rows per second.
@@ -176,7 +176,7 @@ fn framed_mirror(builder: &mut Builder, mirror: u32) {
 fn rolling_sphere(builder: &mut Builder) -> Rolling {
     let rgb = Vec3::new;
     let colors = [rgb(0.90, 0.32, 0.16), rgb(0.95, 0.78, 0.24), rgb(0.16, 0.42, 0.62)];
-    let material = builder.matte(ball(9, colors));
+    let material = builder.matte(ball(6, colors));
     let centre = Vec3::new(0.0, SPHERE_RADIUS, 3.0);
     let node = builder.sphere("sphere", material, centre, SPHERE_RADIUS);
     let bumper = builder.matte(checker([2, 2], rgb(0.92, 0.80, 0.20), rgb(0.16, 0.16, 0.18)));

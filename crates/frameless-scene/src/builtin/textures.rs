@@ -70,23 +70,11 @@ pub(super) fn dots(across: [u32; 2], dot: Vec3, ground: Vec3) -> Image {
     })
 }
 
-/// For the rolling sphere: gores of three colours like a beach ball's, cut by white rings.
+/// For the rolling sphere: a beach ball of three colours, each gore cut into four and shifted from band to band, so
+/// that rolling shows from every side; features as large as a quarter of the ball.
 pub(super) fn ball(gores: u32, colors: [Vec3; 3]) -> Image {
-    const WHITE: Vec3 = Vec3::splat(0.92);
-    const DARK: Vec3 = Vec3::new(0.12, 0.13, 0.2);
-    paint(1024, |uv| {
-        let band = cell(uv.y, 8);
-        if band == 0 || band == 7 {
-            return WHITE;
-        }
-        let in_band = (uv.y * 8.0).fract();
-        if in_band < 0.12 {
-            return DARK;
-        }
-        let gore = (cell(uv.x, gores) + 2 * band) % 3;
-        let in_gore = Vec2::new((uv.x * gores as f32).fract() - 0.5, in_band - 0.56);
-        if in_gore.length() < 0.2 { WHITE } else { colors[gore as usize] }
-    })
+    const BANDS: u32 = 4;
+    paint(512, |uv| colors[((cell(uv.x, gores) + 2 * cell(uv.y, BANDS)) % 3) as usize])
 }
 
 /// A number in [0, 1) that looks random and depends on the arguments only.
