@@ -46,6 +46,7 @@ pub(crate) enum Command {
     Render(RenderArgs),
     Trace(TraceArgs),
     Info(InfoArgs),
+    Bench(BenchArgs),
     /// List the built-in scenes
     #[command(after_help = "Example:\n  frameless scenes")]
     Scenes,
@@ -240,4 +241,52 @@ mod tests {
             (default.exposure, default.threads, default.seed, default.screenshot, default.after)
         );
     }
+}
+
+/// Measure how fast this machine runs the loop
+///
+/// Speeds are measured in alternating rounds of one run, and given as medians with the smallest and the
+/// largest round. Close other programs first.
+#[derive(ClapArgs)]
+#[command(after_help = "Examples:
+  frameless bench engine
+  frameless bench engine --scene model.glb --threads 1
+  frameless bench sampler --json")]
+pub(crate) struct BenchArgs {
+    /// What to measure
+    #[arg(value_enum)]
+    pub(crate) what: Benchmark,
+
+    /// A glTF file or a built-in scene
+    #[arg(long, default_value = DEFAULT_SCENE)]
+    pub(crate) scene: String,
+
+    /// Size of the picture in pixels
+    #[arg(long, value_name = "WxH", default_value = "512x384", value_parser = parse::size)]
+    pub(crate) size: Size,
+
+    /// Threads that trace; 0: one per core
+    #[arg(long, default_value_t = 0)]
+    pub(crate) threads: usize,
+
+    /// How often everything is measured
+    #[arg(long, default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(crate) rounds: u32,
+
+    /// Length of a measurement in seconds
+    #[arg(long, default_value_t = 0.5, value_parser = parse::positive)]
+    pub(crate) secs: f64,
+
+    /// Print one JSON object, {"rows": [{name, value, min, max, unit, conditions}]}
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// The benchmarks.
+#[derive(Clone, Copy, clap::ValueEnum)]
+pub(crate) enum Benchmark {
+    /// The whole loop on the real clock: samples per second of every sampler
+    Engine,
+    /// The samplers alone: nanoseconds per sample beside the renderer
+    Sampler,
 }

@@ -1,6 +1,7 @@
 //! The program `frameless`. One file per subcommand; `args` says what each of them takes.
 
 mod args;
+mod bench;
 mod compare;
 mod failure;
 mod info;
@@ -43,6 +44,7 @@ fn run(args: Args) -> Result<(), Failure> {
         Command::Render(args) => render::run(&args),
         Command::Trace(args) => trace::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::Bench(args) => bench::run(&args),
         Command::Scenes => scenes::run(),
     }
 }

@@ -44,7 +44,10 @@ impl Canvas {
     #[inline]
     pub(crate) fn replace(&mut self, pixel: u32, time: Time, rgb: [f32; 3]) -> (Time, [f32; 3]) {
         let i = pixel as usize;
-        (std::mem::replace(&mut self.time[i], time), std::mem::replace(&mut self.rgb[i], rgb))
+        let replaced = (self.time[i], self.rgb[i]);
+        self.time[i] = time;
+        self.rgb[i] = rgb;
+        replaced
     }
 
     /// The same picture in another size: every pixel takes the sample nearest to its centre, age included.

@@ -20,7 +20,19 @@ pub struct Engine<T> {
     counters: Counters,
     // Reused from batch to batch.
     spare_requests: Vec<Request>,
+    replaced: Replaced,
     observations: Vec<Observation>,
+}
+
+/// The samples of one answer and what they took the place of, in the answer's order.
+#[derive(Default)]
+struct Replaced {
+    /// Pixel, and when it had been traced before.
+    places: Vec<(u32, Time)>,
+    old: Vec<[f32; 3]>,
+    new: Vec<[f32; 3]>,
+    /// Scratch memory of [`Display::changes`].
+    squares: Vec<f32>,
 }
 
 /// What the loop has done so far.
@@ -102,6 +114,7 @@ impl<T: Tracer> Engine<T> {
             outstanding: 0,
             counters: Counters::default(),
             spare_requests: Vec::new(),
+            replaced: Replaced::default(),
             observations: Vec::new(),
         }
     }
@@ -190,15 +203,19 @@ impl<T: Tracer> Engine<T> {
         };
         self.outstanding = self.outstanding.saturating_sub(answer.requests.len());
         let outcome = self.keep(&answer);
-        self.sampler.observe(&self.observations);
-        self.counters.kept += self.observations.len() as u64;
+        let kept = self.observe(answer.now);
         self.spare_requests = answer.requests;
-        outcome.map(|()| Some(self.observations.len()))
+        outcome.map(|()| Some(kept))
     }
 
-    /// Writes an answer to the canvas and notes what each sample changed.
+    /// Writes an answer to the canvas and notes what each sample replaced.
+    ///
+    /// Only memory is moved here, in a loop so short that many pixels are fetched at once; what the samples
+    /// changed is worked out afterwards from `replaced`, which lies in the cache.
     fn keep(&mut self, answer: &Answer) -> Result<(), EngineError> {
-        self.observations.clear();
+        self.replaced.places.clear();
+        self.replaced.old.clear();
+        self.replaced.new.clear();
         let (requests, colours) = (answer.requests.len(), answer.rgb.len());
         let surfaces = answer.surfaces.len();
         if colours != requests || (surfaces != requests && surfaces != 0) {
@@ -224,10 +241,24 @@ impl<T: Tracer> Engine<T> {
                 continue;
             }
             let (previous, old) = self.canvas.replace(pixel, answer.now, rgb);
-            let change = self.display.change(rgb, old);
-            self.observations.push(Observation { pixel, now: answer.now, previous, change });
+            self.replaced.places.push((pixel, previous));
+            self.replaced.old.push(old);
+            self.replaced.new.push(rgb);
         }
         Ok(())
+    }
+
+    /// Tells the sampler what the samples just kept have changed. Returns how many they are.
+    fn observe(&mut self, now: Time) -> usize {
+        let Replaced { places, old, new, squares } = &mut self.replaced;
+        let changes = self.display.changes(new, old, squares);
+        self.observations.clear();
+        let observation =
+            |(&(pixel, previous), change)| Observation { pixel, now, previous, change };
+        self.observations.extend(places.iter().zip(changes).map(observation));
+        self.sampler.observe(&self.observations);
+        self.counters.kept += self.observations.len() as u64;
+        self.observations.len()
     }
 
     /// The present time of the engine's clock.

@@ -21,6 +21,8 @@
 //! # Ok::<(), frameless::EngineError>(())
 //! ```
 
+mod alias;
+mod bilinear;
 mod canvas;
 mod clock;
 mod display;

@@ -10,6 +10,31 @@ pub(crate) struct TileGrid {
     pub(crate) side: u32,
     pub(crate) columns: u32,
     pub(crate) rows: u32,
+    by_width: Divider,
+    by_side: Divider,
+}
+
+/// Divides by a number that is known long before; three times as fast as the processor's own division (Lemire, Kaser and
+/// Kurz 2019, "Faster remainder by direct computation").
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Divider {
+    divisor: u32,
+    /// ⌈2⁶⁴ / divisor⌉; the quotient is then exact for every 32-bit dividend. Wraps to 0 for divisor 1.
+    reciprocal: u64,
+}
+
+impl Divider {
+    fn new(divisor: u32) -> Divider {
+        Divider { divisor, reciprocal: (u64::MAX / u64::from(divisor)).wrapping_add(1) }
+    }
+
+    #[inline]
+    fn quotient(self, dividend: u32) -> u32 {
+        if self.divisor == 1 {
+            return dividend;
+        }
+        ((u128::from(self.reciprocal) * u128::from(dividend)) >> 64) as u32
+    }
 }
 
 /// A tile's pixels: columns `x0..x1`, rows `y0..y1`.
@@ -32,7 +57,8 @@ impl TileGrid {
     pub(crate) fn new(size: Size, side: u32) -> TileGrid {
         let side = side.max(1);
         let (columns, rows) = (size.width.div_ceil(side), size.height.div_ceil(side));
-        TileGrid { size, side, columns, rows }
+        let (by_width, by_side) = (Divider::new(size.width), Divider::new(side));
+        TileGrid { size, side, columns, rows, by_width, by_side }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -41,8 +67,9 @@ impl TileGrid {
 
     #[inline]
     pub(crate) fn tile_of(&self, pixel: u32) -> usize {
-        let (x, y) = self.size.xy(pixel);
-        (y / self.side * self.columns + x / self.side) as usize
+        let y = self.by_width.quotient(pixel);
+        let x = pixel - y * self.size.width;
+        (self.by_side.quotient(y) * self.columns + self.by_side.quotient(x)) as usize
     }
 
     pub(crate) fn rect(&self, tile: usize) -> TileRect {
@@ -60,6 +87,17 @@ impl TileGrid {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn division_is_exact() {
+        for divisor in [1, 2, 3, 7, 16, 512, 1000, 3840, 65_537, u32::MAX - 1, u32::MAX] {
+            let near = |n: u64| (n.saturating_sub(2)..n + 3).map(|n| n as u32);
+            let multiples = (0..40).map(|k| (1u64 << k) / u64::from(divisor) * u64::from(divisor));
+            for dividend in multiples.flat_map(near).chain([0, 1, u32::MAX]) {
+                assert_eq!(Divider::new(divisor).quotient(dividend), dividend / divisor);
+            }
+        }
+    }
 
     #[test]
     fn tiles_cover_every_pixel_once() {

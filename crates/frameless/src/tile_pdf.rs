@@ -13,19 +13,27 @@
 //! tile's pixels. For whole tiles that is the same. At the border, where tiles may be cut, it keeps
 //! an even distribution even; interpolating P(T) would halve the density beside a cut tile.
 
+use crate::bilinear::Bilinear;
 use crate::tile::TileGrid;
 use crate::{Request, Rng};
 
 /// Tile probabilities P(T), in the grid's order; they sum to 1.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct TilePdf {
     pub(crate) probability: Vec<f32>,
+    bilinear: Bilinear,
     // Reused from draw to draw; `density` is P(T) / n_T.
     density: Vec<f32>,
     spacings: Vec<f64>,
 }
 
 impl TilePdf {
+    /// For a grid; the probabilities are yet to be filled in.
+    pub(crate) fn new(grid: &TileGrid) -> TilePdf {
+        let bilinear = Bilinear::new(grid);
+        TilePdf { probability: Vec::new(), bilinear, density: Vec::new(), spacings: Vec::new() }
+    }
+
     /// Append `count` independent draws, ordered by tile.
     ///
     /// All of a batch is drawn from one distribution, so the draws' order is free; tile by tile they meet warm caches
@@ -33,31 +41,26 @@ impl TilePdf {
     /// count + 1 exponential variates, divided by their total, are distributed as sorted uniforms (Devroye 1986,
     /// "Non-Uniform Random Variate Generation", §V.2.1 theorem 2.2). One sweep over the tiles then
     /// inverts the cumulative distribution for all of them.
-    pub(crate) fn draw(
-        &mut self,
-        grid: &TileGrid,
-        rng: &mut Rng,
-        count: usize,
-        requests: &mut Vec<Request>,
-    ) {
+    pub(crate) fn draw(&mut self, rng: &mut Rng, count: usize, requests: &mut Vec<Request>) {
         self.density.clear();
-        self.density.extend(densities(grid, &self.probability));
+        self.density.extend(densities(self.bilinear.grid(), &self.probability));
         let total_spacing = self.draw_spacings(rng, count);
         let total: f64 = self.probability.iter().map(|&p| f64::from(p)).sum();
         let scale = total / total_spacing;
         let last = self.probability.iter().rposition(|&p| p > 0.0).unwrap_or(0);
         let (mut tile, mut cumulative) = (0, f64::from(self.probability[0]));
-        let mut pixels = None;
-        for i in 0..count {
-            let target = self.spacings[i] * scale;
-            while target >= cumulative && tile < last {
+        let mut first = 0;
+        while first < count {
+            while self.spacings[first] * scale >= cumulative && tile < last {
                 tile += 1;
                 cumulative += f64::from(self.probability[tile]);
-                pixels = None;
             }
-            let inside =
-                pixels.get_or_insert_with(|| Interpolation::new(grid, &self.density, tile));
-            requests.push(Request::centre(inside.draw(grid, rng)));
+            let in_tile = |spacing: &&f64| **spacing * scale < cumulative || tile == last;
+            let draws = self.spacings[first..].iter().take_while(in_tile).count();
+            let inside = self.bilinear.inside(tile, &self.density);
+            let mixture = inside.mixture();
+            requests.extend((0..draws).map(|_| Request::centre(inside.draw(&mixture, rng))));
+            first += draws;
         }
     }
 
@@ -73,19 +76,19 @@ impl TilePdf {
     }
 
     /// P(p) for every pixel, by the definition above: the density of [`TilePdf::draw`].
-    pub(crate) fn pixel_probability(&self, grid: &TileGrid) -> Vec<f32> {
-        let mut probability = vec![0.0; grid.size.pixels()];
+    pub(crate) fn pixel_probability(&self) -> Vec<f32> {
+        let grid = self.bilinear.grid();
         let density: Vec<f32> = densities(grid, &self.probability).collect();
+        let mut probability = vec![0.0; grid.size.pixels()];
         for tile in 0..grid.len() {
-            let rect = grid.rect(tile);
-            let inside = Interpolation::new(grid, &density, tile);
-            let pixels =
-                || (rect.y0..rect.y1).flat_map(|y| (rect.x0..rect.x1).map(move |x| (x, y)));
-            let sum: f64 = pixels().map(|(x, y)| f64::from(inside.value(x, y))).sum();
+            let (rect, inside) = (grid.rect(tile), self.bilinear.inside(tile, &density));
+            let (width, height) = (rect.x1 - rect.x0, rect.y1 - rect.y0);
+            let pixels = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+            let sum: f64 = pixels().map(|(x, y)| inside.value(x, y)).sum();
             for (x, y) in pixels() {
-                let share = if sum > 0.0 { f64::from(inside.value(x, y)) / sum } else { 0.0 };
-                probability[grid.size.index(x, y) as usize] =
-                    (f64::from(self.probability[tile]) * share) as f32;
+                let share = if sum > 0.0 { inside.value(x, y) / sum } else { 0.0 };
+                let pixel = grid.size.index(rect.x0 + x, rect.y0 + y);
+                probability[pixel as usize] = (f64::from(self.probability[tile]) * share) as f32;
             }
         }
         probability
@@ -101,66 +104,6 @@ fn densities(grid: &TileGrid, probability: &[f32]) -> impl Iterator<Item = f32> 
 /// −ln u with u uniform in (0, 1]: exponentially distributed with mean 1.
 fn exponential(rng: &mut Rng) -> f64 {
     -f64::from((1.0 - rng.unit_f32()).ln())
-}
-
-/// b(x, y) inside one tile.
-struct Interpolation {
-    rect: crate::tile::TileRect,
-    centre: [f32; 2],
-    inverse_side: f32,
-    // P(T) / n_T of the 3×3 tiles around, clamped at the border; [row][column].
-    knots: [[f32; 3]; 3],
-    largest: f32,
-}
-
-impl Interpolation {
-    fn new(grid: &TileGrid, density: &[f32], tile: usize) -> Interpolation {
-        let rect = grid.rect(tile);
-        let (column, row) = (tile as u32 % grid.columns, tile as u32 / grid.columns);
-        // 0, 1, 2 for the tile before, the tile itself, the tile after; clamped.
-        let near =
-            |own: u32, step: usize, len: u32| (own + step as u32).saturating_sub(1).min(len - 1);
-        let knots: [[f32; 3]; 3] = std::array::from_fn(|j| {
-            std::array::from_fn(|i| {
-                let (column, row) = (near(column, i, grid.columns), near(row, j, grid.rows));
-                density[(row * grid.columns + column) as usize]
-            })
-        });
-        let half = 0.5 * grid.side as f32;
-        Interpolation {
-            rect,
-            centre: [rect.x0 as f32 + half, rect.y0 as f32 + half],
-            inverse_side: 1.0 / grid.side as f32,
-            knots,
-            largest: knots.iter().flatten().fold(0.0, |a, &b| a.max(b)),
-        }
-    }
-
-    /// b at the centre of pixel (x, y) of the tile.
-    #[inline]
-    fn value(&self, x: u32, y: u32) -> f32 {
-        // Distance from the tile's own knot in tiles, within ±1/2.
-        let u = (x as f32 + 0.5 - self.centre[0]) * self.inverse_side;
-        let v = (y as f32 + 0.5 - self.centre[1]) * self.inverse_side;
-        let (i, j) = (if u < 0.0 { 0 } else { 2 }, if v < 0.0 { 0 } else { 2 });
-        let (u, v) = (u.abs(), v.abs());
-        let own_row = self.knots[1][1] + (self.knots[1][i] - self.knots[1][1]) * u;
-        let other_row = self.knots[j][1] + (self.knots[j][i] - self.knots[j][1]) * u;
-        own_row + (other_row - own_row) * v
-    }
-
-    /// A pixel of the tile with density ∝ b, by rejection from the uniform distribution. The tile has been drawn,
-    /// so its own P is positive, and with it b everywhere inside: this ends.
-    fn draw(&self, grid: &TileGrid, rng: &mut Rng) -> u32 {
-        let (width, height) = (self.rect.x1 - self.rect.x0, self.rect.y1 - self.rect.y0);
-        loop {
-            let x = self.rect.x0 + rng.below(width);
-            let y = self.rect.y0 + rng.below(height);
-            if rng.unit_f32() * self.largest < self.value(x, y) {
-                return grid.size.index(x, y);
-            }
-        }
-    }
 }
 
 #[cfg(test)]
@@ -187,6 +130,10 @@ mod tests {
         ((chi2 / k).powf(1.0 / 3.0) - (1.0 - 2.0 / (9.0 * k))) / (2.0 / (9.0 * k)).sqrt()
     }
 
+    fn pdf_of(grid: &TileGrid, probability: Vec<f32>) -> TilePdf {
+        TilePdf { probability, ..TilePdf::new(grid) }
+    }
+
     fn draw_counts(
         pdf: &mut TilePdf,
         grid: &TileGrid,
@@ -199,7 +146,7 @@ mod tests {
         let mut requests = Vec::new();
         for _ in 0..batches {
             requests.clear();
-            pdf.draw(grid, &mut rng, batch, &mut requests);
+            pdf.draw(&mut rng, batch, &mut requests);
             requests.iter().for_each(|r| counts[r.pixel as usize] += 1);
         }
         counts
@@ -212,8 +159,8 @@ mod tests {
         let weights =
             [0, 1, 20, 3, 4, 1, 1, 9, 2, 5, 20, 2, 0, 7, 1, 6, 1, 1, 3, 0].map(|w| w as f32);
         let total: f32 = weights.iter().sum();
-        let probability = weights.iter().map(|w| w / total).collect();
-        (grid, TilePdf { probability, ..TilePdf::default() })
+        let pdf = pdf_of(&grid, weights.iter().map(|w| w / total).collect());
+        (grid, pdf)
     }
 
     /// Bilinear interpolation written the long way: the sum over all knots of P times two hat functions, with
@@ -274,13 +221,13 @@ mod tests {
     fn draws_of_one_batch_are_independent() {
         // If they were stratified, the number of draws in a half of the picture would vary less than a binomial.
         let grid = TileGrid::new(Size::new(16, 8), 8);
-        let mut pdf = TilePdf { probability: vec![0.5, 0.5], ..TilePdf::default() };
+        let mut pdf = pdf_of(&grid, vec![0.5, 0.5]);
         let mut rng = Rng::new(4);
         let (batches, n) = (4000, 100);
         let mut sum_of_squares = 0.0;
         for _ in 0..batches {
             let mut requests = Vec::new();
-            pdf.draw(&grid, &mut rng, n, &mut requests);
+            pdf.draw(&mut rng, n, &mut requests);
             let left = requests.iter().filter(|r| grid.tile_of(r.pixel) == 0).count();
             sum_of_squares += (left as f64 - 50.0).powi(2);
         }
@@ -293,8 +240,7 @@ mod tests {
     #[test]
     fn pixel_probability_is_the_density_that_is_drawn() {
         let (grid, mut pdf) = uneven();
-        let probability: Vec<f64> =
-            pdf.pixel_probability(&grid).iter().map(|&p| f64::from(p)).collect();
+        let probability: Vec<f64> = pdf.pixel_probability().iter().map(|&p| f64::from(p)).collect();
         assert!((probability.iter().sum::<f64>() - 1.0).abs() < 1e-5);
         let counts = draw_counts(&mut pdf, &grid, 3, 3000, 1000);
         let sigmas = chi2_sigmas(&counts, &probability);
@@ -305,7 +251,7 @@ mod tests {
     fn one_tile_and_one_pixel() {
         for (width, height) in [(1, 1), (5, 3)] {
             let grid = TileGrid::new(Size::new(width, height), 16);
-            let mut pdf = TilePdf { probability: vec![1.0], ..TilePdf::default() };
+            let mut pdf = pdf_of(&grid, vec![1.0]);
             let counts = draw_counts(&mut pdf, &grid, 5, 10, 1000);
             let n = grid.size.pixels();
             if n == 1 {

@@ -1,0 +1,19 @@
+//! `frameless bench`: speeds as ratios against something measured in the same run.
+
+mod engine;
+mod sampler;
+mod table;
+
+use crate::args::{BenchArgs, Benchmark};
+use crate::failure::Failure;
+use crate::output;
+
+/// Measure, then print a table or JSON.
+pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
+    let rows = match args.what {
+        Benchmark::Engine => engine::measure(args)?,
+        Benchmark::Sampler => sampler::measure(args),
+    };
+    let text = if args.json { table::json(&rows) } else { table::plain(&rows) };
+    Ok(output::print(&text)?)
+}

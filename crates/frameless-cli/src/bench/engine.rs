@@ -1,0 +1,69 @@
+//! The whole loop on the real clock: samples per second of every sampler, in alternating rounds.
+
+use std::sync::Arc;
+
+use frameless::{Clock, Engine, SamplerKind};
+use frameless_trace::{CpuTracer, Settings, ViewSource, World};
+
+use super::table::Row;
+use crate::args::BenchArgs;
+use crate::failure::Failure;
+use crate::input;
+
+// The first turns of a run learn the batch length; they are not counted.
+const WARM_UP_SECS: f64 = 0.2;
+
+/// Rows `engine.<sampler>_samples_per_sec` and `engine.<sampler>_over_random`, the ratio round by round.
+pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
+    let world = Arc::new(World::new(Arc::new(input::scene(&args.scene)?)));
+    let mut rates = SamplerKind::ALL.map(|_| Vec::new());
+    for round in 0..args.rounds {
+        for (kind, rates) in SamplerKind::ALL.into_iter().zip(&mut rates) {
+            rates.push(samples_per_sec(&world, kind, args, u64::from(round)));
+        }
+    }
+    let conditions = format!(
+        "{}, {}×{}, real clock, {} threads, {} alternating rounds of {} s; surfaces are not asked for",
+        args.scene,
+        args.size.width,
+        args.size.height,
+        threads(args),
+        args.rounds,
+        args.secs
+    );
+    let random = &rates[0];
+    let mut rows = Vec::new();
+    for (kind, rates) in SamplerKind::ALL.into_iter().zip(&rates) {
+        let name = format!("engine.{}_samples_per_sec", kind.name());
+        rows.push(Row::new(name, "samples/s", rates, &conditions));
+    }
+    for (kind, rates) in SamplerKind::ALL.into_iter().zip(&rates).skip(1) {
+        let ratios: Vec<f64> = rates.iter().zip(random).map(|(a, b)| a / b).collect();
+        let name = format!("engine.{}_over_random", kind.name());
+        rows.push(Row::new(name, "ratio", &ratios, &conditions));
+    }
+    Ok(rows)
+}
+
+fn threads(args: &BenchArgs) -> usize {
+    match args.threads {
+        0 => std::thread::available_parallelism().map_or(1, usize::from),
+        threads => threads,
+    }
+}
+
+fn samples_per_sec(world: &Arc<World>, kind: SamplerKind, args: &BenchArgs, seed: u64) -> f64 {
+    let settings = Settings { surfaces: false, ..Settings::default() };
+    let view = ViewSource::Camera(0);
+    let tracer = CpuTracer::new(Arc::clone(world), view, settings, args.threads);
+    let mut engine = Engine::new(args.size, Clock::real(), kind.build(seed), tracer);
+    let mut run_for = |secs: f64| {
+        let (begin, kept) = (engine.now(), engine.counters().kept);
+        while engine.now().secs_since(begin) < secs {
+            engine.step().expect("the tracer's colours are finite");
+        }
+        (engine.counters().kept - kept) as f64 / engine.now().secs_since(begin)
+    };
+    run_for(WARM_UP_SECS);
+    run_for(args.secs)
+}

@@ -1,0 +1,62 @@
+//! What was measured, for people and for programs.
+
+use std::fmt::Write;
+
+use serde::Serialize;
+
+/// One figure: the median of several rounds, with the smallest and the largest.
+#[derive(Serialize)]
+pub(super) struct Row {
+    pub(super) name: String,
+    /// The median.
+    pub(super) value: f64,
+    pub(super) min: f64,
+    pub(super) max: f64,
+    pub(super) unit: &'static str,
+    pub(super) conditions: String,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    rows: &'a [Row],
+}
+
+impl Row {
+    /// # Panics
+    /// If there is no round.
+    pub(super) fn new(
+        name: impl Into<String>,
+        unit: &'static str,
+        rounds: &[f64],
+        conditions: &str,
+    ) -> Row {
+        let mut sorted = rounds.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let (min, max) = (sorted[0], sorted[sorted.len() - 1]);
+        let value = sorted[sorted.len() / 2];
+        Row { name: name.into(), value, min, max, unit, conditions: conditions.to_owned() }
+    }
+}
+
+pub(super) fn json(rows: &[Row]) -> String {
+    serde_json::to_string_pretty(&Report { rows }).expect("plain data") + "\n"
+}
+
+pub(super) fn plain(rows: &[Row]) -> String {
+    let mut text = format!("{:36} {:>12} {:>12} {:>12}  unit\n", "name", "median", "min", "max");
+    for row in rows {
+        // Writing to a string cannot fail.
+        let [value, min, max] = [row.value, row.min, row.max].map(four_digits);
+        let _ = writeln!(text, "{:36} {value:>12} {min:>12} {max:>12}  {}", row.name, row.unit);
+    }
+    if let Some(row) = rows.first() {
+        let _ = writeln!(text, "\n{}", row.conditions);
+    }
+    text
+}
+
+/// Four significant digits, without an exponent.
+fn four_digits(value: f64) -> String {
+    let before_point = value.abs().max(1e-9).log10().floor() as i32 + 1;
+    format!("{:.*}", (4 - before_point).clamp(0, 6) as usize, value)
+}
