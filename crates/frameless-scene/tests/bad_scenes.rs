@@ -45,11 +45,12 @@ fn each_is_refused_with_its_place_or_drawn_with_a_warning() {
     let expected = std::fs::read_to_string(folder.join("EXPECTED.json")).unwrap();
     let expected: Value = serde_json::from_str(&expected).unwrap();
     let files = expected["files"].as_array().unwrap();
-    let mut failures = Vec::new();
+    let (mut failures, mut absent) = (Vec::new(), 0);
     for file in files {
         let path = folder.join(file["file"].as_str().unwrap());
         if !path.exists() {
-            eprintln!("SKIPPED: {} is missing", path.display());
+            eprintln!("listed in EXPECTED.json, but not there: {}", path.display());
+            absent += 1;
             continue;
         }
         let begin = Instant::now();
@@ -69,6 +70,8 @@ fn each_is_refused_with_its_place_or_drawn_with_a_warning() {
         };
         failures.extend(complaint.map(|complaint| format!("{}: {complaint}", path.display())));
     }
+    // One of the 112 listed files is not in the folder as it was published.
+    assert!(absent <= 1, "{absent} files that EXPECTED.json lists are not there");
     assert!(failures.is_empty(), "{failures:#?}");
     assert_eq!(files.len(), 112);
 }

@@ -92,7 +92,7 @@ fn srgb_from_linear(linear: f32) -> f32 {
     let x = linear.clamp(0.0, 1.0);
     let (root2, root4) = (x.sqrt(), x.sqrt().sqrt());
     let power = 1.122_677_6 * root2 + 0.196_137_15 * root4 - 0.335_496_38 * (root2 * root4)
-        + 0.081_327_643 * x
+        + 0.081_327_64 * x
         - 0.064_611_68;
     let line = 12.92 * x;
     if x <= 0.003_130_8 { line } else { power.min(1.0) }

@@ -51,7 +51,7 @@ pub(super) fn newest_frame_start(time: Time, frame_secs: f64, refresh_secs: f64)
     }
     // A frame that ends within a microsecond after the refresh belongs to it: times are rounded to nanoseconds.
     let finished = ((now + 1e-6) / frame_secs).floor();
-    (finished >= 1.0).then(|| (finished - 1.0) * frame_secs)
+    (finished >= 1.0).then_some((finished - 1.0) * frame_secs)
 }
 
 #[cfg(test)]
