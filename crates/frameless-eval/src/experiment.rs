@@ -153,6 +153,9 @@ pub const IDEAL: &str = "ideal";
 // A picture of 16,384² pixels as f32 RGB takes 3 GiB; beyond that nobody means it.
 const LARGEST_SIDE: u32 = 16_384;
 const LONGEST_RUN_REFRESHES: f64 = 100_000.0;
+// The ideal pictures of a scene are kept while its algorithms run: 12 bytes of colour and 1 of change per pixel and refresh.
+const BYTES_PER_PIXEL: f64 = 13.0;
+const MOST_BYTES: f64 = 8.0 * (1u64 << 30) as f64;
 
 impl Experiment {
     /// Reads and checks an experiment file. Scene files are found relative to its folder; they are not opened yet.
@@ -195,6 +198,17 @@ fn check(file: ExperimentFile, folder: &Path) -> Result<Experiment, String> {
             "duration_secs must be at least one refresh, at most {LONGEST_RUN_REFRESHES} refreshes, and longer than \
              unscored_secs; got {} and {}",
             file.duration_secs, file.unscored_secs
+        ));
+    }
+    let bytes = refreshes * f64::from(file.width) * f64::from(file.height) * BYTES_PER_PIXEL;
+    if bytes > MOST_BYTES {
+        return Err(format!(
+            "the ideal pictures of {refreshes} refreshes at {}×{} take {:.1} GiB, more than the {:.0} GiB allowed; \
+             make duration_secs, width or height smaller",
+            file.width,
+            file.height,
+            bytes / f64::from(1u32 << 30),
+            MOST_BYTES / f64::from(1u32 << 30)
         ));
     }
     if let Some(rate) = file.samples_per_sec.iter().find(|r| !(r.is_finite() && **r > 0.0)) {

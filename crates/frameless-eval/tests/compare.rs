@@ -130,6 +130,7 @@ fn bad_experiments_are_refused_by_key_and_line() {
         ("seeds = [1, 2]", "sedes = [1, 2]", "sedes"),
         ("width = 64", "width = 0", "width"),
         ("width = 64", "width = 64.5", "line 6"),
+        ("width = 64\n    height = 48", "width = 8192\n    height = 8192", "GiB"),
         ("[40_000]", "[]", "samples_per_sec is empty"),
         ("[40_000]", "[-1]", "samples_per_sec must be positive"),
         ("\"random\", ", "\"chance\", ", "unknown algorithm \"chance\""),

@@ -19,7 +19,10 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(60, 60, 60),
 ];
 
-/// An SVG with one curve per run: RMSE against the ideal at every refresh.
+// Room above the curves for their names.
+const HEADROOM: f64 = 1.4;
+
+/// An SVG with one curve per run, one colour per algorithm: RMSE against the ideal at every refresh.
 pub(crate) fn plot_curves(path: &Path, title: &str, runs: &[&RunResult]) -> Result<(), EvalError> {
     register_font();
     draw(path, title, runs).map_err(|error| EvalError::unwritable(path, error))
@@ -30,6 +33,8 @@ fn draw(
     title: &str,
     runs: &[&RunResult],
 ) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+    let mut algorithms: Vec<&str> = runs.iter().map(|run| run.algorithm.as_str()).collect();
+    algorithms.dedup();
     let highest = runs.iter().flat_map(|run| &run.rmse.curve).fold(0.0, |a: f64, &b| a.max(b));
     let secs_of = |run: &RunResult, k: usize| (k + 1) as f64 / f64::from(run.display_hz);
     let longest = runs.iter().map(|run| secs_of(run, run.refreshes - 1)).fold(0.0, f64::max);
@@ -43,21 +48,25 @@ fn draw(
             .caption(title, ("sans-serif", 20))
             .x_label_area_size(40)
             .y_label_area_size(60)
-            .build_cartesian_2d(0.0..longest, 0.0..(highest * 1.1).max(1e-6))?;
+            .build_cartesian_2d(0.0..longest, 0.0..(highest * HEADROOM).max(1e-6))?;
         chart
             .configure_mesh()
             .x_desc("time (s)")
             .y_desc("RMSE against the ideal (sRGB)")
             .light_line_style(WHITE)
             .draw()?;
-        for (i, run) in runs.iter().enumerate() {
-            let style = COLOURS[i % COLOURS.len()].stroke_width(2);
-            let points = run.rmse.curve.iter().enumerate().map(|(k, &e)| (secs_of(run, k), e));
-            let label = format!("{}, seed {}: mean {:.4}", run.algorithm, run.seed, run.rmse.mean);
-            chart
-                .draw_series(LineSeries::new(points, style))?
-                .label(label)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
+        for (algorithm, colour) in algorithms.iter().zip(COLOURS.into_iter().cycle()) {
+            let style = colour.stroke_width(2);
+            let seeds: Vec<_> = runs.iter().filter(|run| run.algorithm == *algorithm).collect();
+            let mean = seeds.iter().map(|run| run.rmse.mean).sum::<f64>() / seeds.len() as f64;
+            for (k, run) in seeds.into_iter().enumerate() {
+                let points = run.rmse.curve.iter().enumerate().map(|(k, &e)| (secs_of(run, k), e));
+                let curve = chart.draw_series(LineSeries::new(points, style))?;
+                if k == 0 {
+                    let line = move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style);
+                    curve.label(format!("{algorithm}: mean {mean:.4}")).legend(line);
+                }
+            }
         }
         chart
             .configure_series_labels()
