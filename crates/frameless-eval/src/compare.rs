@@ -122,10 +122,8 @@ fn compare_rate(
             progress.advance();
             let wanted = keep && (experiment.video || experiment.stills.contains(&k));
             pictures.push(if wanted { rgb8(picture) } else { Vec::new() });
+            !progress.should_stop()
         };
-        if progress.should_stop() {
-            return Err(EvalError::Interrupted);
-        }
         let result = run(cell, experiment, subject, ideals, &mut look)?;
         Ok(Shown { result, pictures })
     };

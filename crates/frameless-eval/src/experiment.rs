@@ -33,6 +33,7 @@ use serde::Deserialize;
 use crate::algorithm::Algorithm;
 use crate::camera_path::{CameraPath, CameraSpec};
 use crate::error::EvalError;
+use crate::output::strip_size;
 
 /// A checked experiment.
 #[derive(Clone, Debug)]
@@ -147,6 +148,9 @@ fn default_unscored_secs() -> f64 {
     0.5
 }
 
+// Least side, largest width and largest height of a video: the limits of the H.264 encoder, a little above its least.
+const VIDEO_SIDES: (u32, u32, u32) = (64, 3840, 2160);
+
 /// The name of the ideal instantaneous renderer in `show`, stills and videos.
 pub const IDEAL: &str = "ideal";
 
@@ -155,6 +159,8 @@ const LARGEST_SIDE: u32 = 16_384;
 const LONGEST_RUN_REFRESHES: f64 = 100_000.0;
 // The ideal pictures of a scene are kept while its algorithms run: 12 bytes of colour and 1 of change per pixel and refresh.
 const BYTES_PER_PIXEL: f64 = 13.0;
+// A hundred times the sketch's rate; a second of more would take minutes to simulate.
+const MOST_SAMPLES_PER_SEC: f64 = 1e8;
 const MOST_BYTES: f64 = 8.0 * (1u64 << 30) as f64;
 
 impl Experiment {
@@ -211,8 +217,11 @@ fn check(file: ExperimentFile, folder: &Path) -> Result<Experiment, String> {
             MOST_BYTES / f64::from(1u32 << 30)
         ));
     }
-    if let Some(rate) = file.samples_per_sec.iter().find(|r| !(r.is_finite() && **r > 0.0)) {
-        return Err(format!("samples_per_sec must be positive, got {rate}"));
+    let is_possible = |rate: &f64| *rate > 0.0 && *rate <= MOST_SAMPLES_PER_SEC;
+    if let Some(rate) = file.samples_per_sec.iter().find(|rate| !is_possible(rate)) {
+        return Err(format!(
+            "samples_per_sec must be positive and at most {MOST_SAMPLES_PER_SEC}, got {rate}"
+        ));
     }
     let algorithms: Vec<Algorithm> =
         file.algorithms.iter().map(|name| Algorithm::from_name(name)).collect::<Result<_, _>>()?;
@@ -244,20 +253,40 @@ fn check(file: ExperimentFile, folder: &Path) -> Result<Experiment, String> {
     });
     let stills = stills.collect::<Result<_, _>>()?;
     let show = checked_show(file.output.show, &algorithms)?;
+    let size = Size::new(file.width, file.height);
+    let video = file.output.video.unwrap_or(true);
+    if video {
+        check_video(size, show.len())?;
+    }
     Ok(Experiment {
         title: file.title,
         scenes,
         algorithms,
         samples_per_sec: file.samples_per_sec,
         seeds: file.seeds,
-        size: Size::new(file.width, file.height),
+        size,
         display_hz: file.display_hz,
         refreshes: refreshes as usize,
         unscored: unscored as usize,
         stills,
         show,
-        video: file.output.video.unwrap_or(true),
+        video,
     })
+}
+
+/// Whether the encoder takes a video of so many pictures side by side.
+fn check_video(size: Size, pictures: usize) -> Result<(), String> {
+    let Size { width, height } = strip_size(size, pictures);
+    let fits = (VIDEO_SIDES.0..=VIDEO_SIDES.1).contains(&width)
+        && (VIDEO_SIDES.0..=VIDEO_SIDES.2).contains(&height);
+    if fits {
+        return Ok(());
+    }
+    let (least, widest, highest) = VIDEO_SIDES;
+    Err(format!(
+        "{pictures} pictures side by side make a video of {width}×{height}, but it must be at least {least}×{least} and at \
+         most {widest}×{highest}; set output.video = false, or name fewer in output.show"
+    ))
 }
 
 fn check_scene(table: SceneTable, folder: &Path) -> Result<SceneSpec, String> {

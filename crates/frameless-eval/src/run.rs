@@ -1,9 +1,8 @@
 //! One run: one scene, one algorithm, one rate, one seed, against the ideal at every refresh.
 
-use frameless::EngineError;
-
 use crate::algorithm::Algorithm;
 use crate::contender::Arena;
+use crate::error::EvalError;
 use crate::experiment::Experiment;
 use crate::ideal::{Ideals, refresh_time};
 use crate::metrics::{Picture, mean, quantile, rmse, rmse_where};
@@ -23,17 +22,17 @@ pub struct Cell {
     pub seed: u64,
 }
 
-/// Runs a cell. `look` is shown the picture at every refresh, with the refresh's index.
+/// Runs a cell. `look` is shown the picture at every refresh, with the refresh's index, and says whether to go on.
 ///
 /// # Errors
-/// If the tracer returns a colour that is not finite.
+/// If the tracer returns a colour that is not finite, or `look` said no.
 pub fn run(
     cell: &Cell,
     experiment: &Experiment,
     subject: &Subject,
     ideals: &Ideals,
-    look: &mut dyn FnMut(usize, &Picture),
-) -> Result<RunResult, EngineError> {
+    look: &mut dyn FnMut(usize, &Picture) -> bool,
+) -> Result<RunResult, EvalError> {
     let mut contender = cell.algorithm.contender(Arena {
         subject,
         ideals,
@@ -48,7 +47,9 @@ pub fn run(
         contender.show(refresh_time(k, experiment.display_hz), &mut picture)?;
         whole.push(rmse(&picture, ideal));
         changed.push(rmse_where(&ideals.changed[k], &picture, ideal));
-        look(k, &picture);
+        if !look(k, &picture) {
+            return Err(EvalError::Interrupted);
+        }
     }
     Ok(summary(cell, experiment, whole, changed))
 }

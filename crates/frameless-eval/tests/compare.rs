@@ -114,6 +114,31 @@ fn the_ideal_against_itself_is_exactly_zero() {
 }
 
 #[test]
+fn where_nothing_moves_any_more_the_held_picture_is_the_ideal_bit_for_bit() {
+    // The sphere of `settle` rests from 0.8 s on; by 2.5 s every pixel has been traced again.
+    let text = SMALL
+        .replace("\"sphere\"", "\"settle\"")
+        .replace("duration_secs = 0.5", "duration_secs = 2.5");
+    let experiment = Experiment::parse(&text, Path::new("")).expect("valid");
+    let parent = tempfile::tempdir().expect("a temporary folder");
+    let results = compare(&experiment, &parent.path().join("out"), &Counting::new(u64::MAX));
+    for run in results.expect("it runs").runs {
+        assert!(run.rmse.curve[40] > 0.0, "{}: the sphere rolls at 0.68 s", run.algorithm);
+        assert_eq!(run.rmse.curve[149], 0.0, "{}", run.algorithm);
+    }
+}
+
+#[test]
+fn a_video_as_small_as_allowed_is_written() {
+    let text = SMALL.replace("width = 64\n    height = 48", "width = 64\n    height = 36");
+    let text = text.replace("stills_secs = [0.5]", "show = [\"ideal\"]");
+    let experiment = Experiment::parse(&text, Path::new("")).expect("64×64 with its bar");
+    let out = tempfile::tempdir().expect("a temporary folder").path().join("out");
+    compare(&experiment, &out, &Counting::new(u64::MAX)).expect("it runs");
+    assert!(out.join("sphere-40000.mp4").metadata().expect("written").len() > 1000);
+}
+
+#[test]
 fn an_interrupted_comparison_leaves_nothing_behind() {
     let parent = tempfile::tempdir().expect("a temporary folder");
     for limit in [0, 5, 40, 100] {
@@ -133,6 +158,10 @@ fn bad_experiments_are_refused_by_key_and_line() {
         ("width = 64\n    height = 48", "width = 8192\n    height = 8192", "GiB"),
         ("[40_000]", "[]", "samples_per_sec is empty"),
         ("[40_000]", "[-1]", "samples_per_sec must be positive"),
+        ("[40_000]", "[1e300]", "at most 100000000"),
+        ("[40_000]", "[nan]", "samples_per_sec must be positive"),
+        ("width = 64\n    height = 48", "width = 1920\n    height = 1080", "output.video = false"),
+        ("width = 64\n    height = 48", "width = 1\n    height = 1", "output.video = false"),
         ("\"random\", ", "\"chance\", ", "unknown algorithm \"chance\""),
         ("\"sphere\"", "\"cube\"", "neither a built-in scene"),
         ("stills_secs = [0.5]", "stills_secs = [0.6]", "stills_secs"),
@@ -177,5 +206,5 @@ fn the_experiments_in_the_repository_are_valid() {
             read += 1;
         }
     }
-    assert!(read >= 2);
+    assert!(read >= 4);
 }

@@ -76,8 +76,13 @@ impl World {
                 .note(|| format!("ray {depth}: from {:.5} along {:.5}", ray.origin, ray.direction));
             let Some(hit) = moment.targets(self).closest(&ray, stack) else {
                 let sky = self.sky(ray.direction);
-                probe.note(|| format!("  nothing hit: sky {sky:.5}"));
-                radiance += throughput * sky;
+                let gives = throughput * sky;
+                probe.note(|| {
+                    format!(
+                        "  nothing hit: sky {sky:.5}, throughput {throughput:.5}: adds {gives:.6}"
+                    )
+                });
+                radiance += gives;
                 first.get_or_insert_with(|| sky_surface(&ray));
                 break;
             };
@@ -89,8 +94,13 @@ impl World {
             let albedo = (1.0 - mirror) * point.base;
             let (irradiance, lit) = self.direct_light(moment, &point, settings, stack, probe);
             let emissive = Vec3A::from(material.emissive);
-            radiance +=
-                throughput * (emissive + albedo * (Vec3A::from(self.scene().ambient) + irradiance));
+            let ambient = Vec3A::from(self.scene().ambient);
+            let gives = throughput * (emissive + albedo * (ambient + irradiance));
+            probe.note(|| format!("  ambient {ambient:.5} per albedo; emits {emissive:.5}"));
+            probe.note(|| {
+                format!("  albedo {albedo:.5}, throughput {throughput:.5}: adds {gives:.6}")
+            });
+            radiance += gives;
             first.get_or_insert_with(|| Surface {
                 object: hit.instance,
                 primitive: hit.primitive,

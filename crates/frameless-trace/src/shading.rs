@@ -340,7 +340,7 @@ fn the_view_is_that_of_the_submission() {
 }
 
 #[test]
-fn an_explanation_ends_with_the_colour() {
+fn an_explanation_adds_up_to_the_colour() {
     let world = World::new(scenes::mixed());
     let settings = Settings::default();
     let mut longest = 0;
@@ -351,9 +351,19 @@ fn an_explanation_ends_with_the_colour() {
         let view = CAMERA.at(world.scene(), moment.state());
         let (rgb, _) = world.trace(&moment, &view, SIZE, &request, &settings);
         assert!(lines.last().unwrap().contains(&format!("{rgb:?}")), "{lines:#?}");
+        let sum: Vec3 = lines.iter().filter_map(|line| added(line)).sum();
+        // Printed with six digits after the point, at most five terms.
+        assert!((sum - Vec3::from(rgb)).abs().max_element() < 5e-6, "{sum} {lines:#?}");
         longest = longest.max(lines.len());
     }
     assert!(longest > 20, "mirrors have something to tell: {longest} lines");
+}
+
+/// What a line of an explanation says that it adds: `… adds [r, g, b]`.
+fn added(line: &str) -> Option<Vec3> {
+    let list = line.split_once(": adds [")?.1.strip_suffix(']')?;
+    let channels: Vec<f32> = list.split(", ").map(|n| n.parse().unwrap()).collect();
+    Some(Vec3::new(channels[0], channels[1], channels[2]))
 }
 
 fn shared_scenes() -> Option<PathBuf> {

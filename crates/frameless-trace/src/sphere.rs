@@ -63,6 +63,13 @@ mod tests {
         assert_eq!(intersect(&ray([0.0; 3], [0.0, 1.0, 0.0]), 9.0), Some(1.0), "from inside");
         assert_eq!(intersect(&ray([0.0, 1.5, 3.0], [0.0, 0.0, -1.0]), 9.0), None, "beside");
         assert_eq!(intersect(&ray([0.0; 3], [0.0; 3]), 9.0), None, "no direction");
+        // 0.6² + 0.8² = 1: beside the centre the surface is at z = ±0.8.
+        let beside = intersect(&ray([0.0, 0.6, 3.0], [0.0, 0.0, -1.0]), 9.0).unwrap();
+        assert!((beside - 2.2).abs() < 1e-6, "{beside}");
+        let inside = intersect(&ray([0.0, 0.6, 0.0], [0.0, 0.0, 1.0]), 9.0).unwrap();
+        assert!((inside - 0.8).abs() < 1e-6, "{inside}");
+        let slanted = intersect(&ray([2.0, 2.0, 0.5], [-1.0, -1.0, 0.0]), 9.0).unwrap();
+        assert!((slanted - (2.0 - 0.375f32.sqrt())).abs() < 1e-6, "{slanted}");
     }
 
     #[test]

@@ -3,8 +3,8 @@
 use std::ffi::OsString;
 
 /// What to do instead.
-const INSTEAD: &str = "run 'frameless compare experiments/figures.toml --out out' instead, \
-     which writes pictures and a report";
+const INSTEAD: &str = "run 'frameless compare experiments/figures.toml --out out/figures' \
+     instead, which writes numbers, curves, pictures and a video";
 
 /// Whether there is a display to open a window on, told from the environment `variable` as X11 and Wayland programs do.
 /// Always so on systems that need no such variable.

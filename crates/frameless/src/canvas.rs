@@ -6,6 +6,7 @@ use crate::{Size, Time};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Canvas {
     size: Size,
+    generation: u32,
     rgb: Vec<[f32; 3]>,
     time: Vec<Time>,
 }
@@ -13,7 +14,7 @@ pub struct Canvas {
 impl Canvas {
     /// A black canvas on which no pixel has been traced yet (all times [`Time::ZERO`]).
     pub fn new(size: Size) -> Canvas {
-        Canvas { size, rgb: vec![[0.0; 3]; size.pixels()], time: vec![Time::ZERO; size.pixels()] }
+        Canvas::from_picture(size, vec![[0.0; 3]; size.pixels()])
     }
 
     /// A canvas that starts with a whole picture traced at [`Time::ZERO`].
@@ -22,12 +23,18 @@ impl Canvas {
     /// If `rgb` (linear, row-major) does not have one colour per pixel.
     pub fn from_picture(size: Size, rgb: Vec<[f32; 3]>) -> Canvas {
         assert_eq!(rgb.len(), size.pixels(), "one colour per pixel");
-        Canvas { size, rgb, time: vec![Time::ZERO; size.pixels()] }
+        Canvas { size, generation: 0, rgb, time: vec![Time::ZERO; size.pixels()] }
     }
 
     /// Width and height.
     pub fn size(&self) -> Size {
         self.size
+    }
+
+    /// How often the canvas has been resized. Whoever keeps sums over a canvas makes them anew when this has changed: after a
+    /// resize there and back the size is the same, but the samples are not.
+    pub fn generation(&self) -> u32 {
+        self.generation
     }
 
     /// Linear RGB radiance per pixel, row-major.
@@ -66,6 +73,7 @@ impl Canvas {
             .collect();
         Canvas {
             size,
+            generation: self.generation.wrapping_add(1),
             rgb: source.iter().map(|&i| self.rgb[i]).collect(),
             time: source.iter().map(|&i| self.time[i]).collect(),
         }
@@ -84,8 +92,12 @@ mod tests {
     #[test]
     fn resizing_there_and_back_keeps_the_picture() {
         let canvas = numbered(7, 5);
-        assert_eq!(canvas.resized(Size::new(21, 15)).resized(Size::new(7, 5)), canvas);
-        assert_eq!(canvas.resized(canvas.size()), canvas);
+        let back = canvas.resized(Size::new(21, 15)).resized(Size::new(7, 5));
+        assert_eq!(
+            (back.size(), back.rgb(), back.time()),
+            (canvas.size(), canvas.rgb(), canvas.time())
+        );
+        assert_eq!((canvas.generation(), back.generation()), (0, 2));
     }
 
     #[test]

@@ -24,7 +24,7 @@ pub struct Observation {
 /// The same calls give the same choices: all randomness comes from the seed given at construction.
 pub trait Sampler: Send {
     /// Append `count` requests to `requests`. `canvas` is the picture so far; `now` is never earlier than
-    /// any time in it.
+    /// any time in it. Its size may differ from call to call, see [`Canvas::generation`].
     fn choose(&mut self, now: Time, canvas: &Canvas, count: usize, requests: &mut Vec<Request>);
 
     /// Learn from samples that have just been written to the canvas.

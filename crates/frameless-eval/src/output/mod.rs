@@ -8,5 +8,5 @@ mod video;
 
 pub(crate) use folder::OutputFolder;
 pub(crate) use plot::plot_curves;
-pub(crate) use strip::{Strip, write_still};
+pub(crate) use strip::{Strip, strip_size, write_still};
 pub(crate) use video::write_video;

@@ -8,6 +8,14 @@ use image::RgbImage;
 use super::text::draw_text;
 use crate::error::EvalError;
 
+/// Width and height of a row of `count` pictures (at least one) with their names.
+pub(crate) fn strip_size(panel: Size, count: usize) -> Size {
+    let count = count as u32;
+    // H.264 with 4:2:0 chroma needs even sides.
+    let even = |n: u32| n.next_multiple_of(2);
+    Size::new(even(count * panel.width + (count - 1) * GAP_PX), even(BAR_PX + panel.height))
+}
+
 /// The layout of a row of pictures.
 pub(crate) struct Strip {
     panel: Size,
@@ -21,11 +29,8 @@ const BACKGROUND: [u8; 3] = [24, 24, 27];
 
 impl Strip {
     pub(crate) fn new(panel: Size, names: &[String]) -> Strip {
-        let count = names.len() as u32;
-        // H.264 with 4:2:0 chroma needs even sides.
-        let even = |n: u32| n.next_multiple_of(2);
-        let width = even(count * panel.width + (count - 1) * GAP_PX);
-        let mut blank = RgbImage::from_pixel(width, even(BAR_PX + panel.height), BACKGROUND.into());
+        let Size { width, height } = strip_size(panel, names.len());
+        let mut blank = RgbImage::from_pixel(width, height, BACKGROUND.into());
         for (i, name) in names.iter().enumerate() {
             draw_text(&mut blank, name, i as u32 * (panel.width + GAP_PX) + 6, 5, 18);
         }

@@ -24,8 +24,9 @@ use crate::{Canvas, Insight, Observation, Request, Rng, Sampler, Time};
 /// wasted where nothing happens.
 pub const DEFAULT_W_D: f32 = 0.9;
 
-/// Default side of a tile in pixels. Larger tiles blur where the change is; smaller ones (4) are too few pixels to
-/// tell change from chance.
+/// Default side of a tile in pixels. Larger tiles blur where the change is. Small ones (4) find a change late that
+/// moves into tiles where nothing has changed yet: they serve as well where everything changes, and twice as badly
+/// where little does (docs/evaluation.md).
 pub const DEFAULT_TILE: u32 = 16;
 
 /// The 2002 sketch, exactly.
@@ -38,6 +39,7 @@ pub struct Change {
 
 /// What is known of one canvas.
 struct Known {
+    generation: u32,
     sums: Sums,
     pdf: TilePdf,
 }
@@ -51,15 +53,19 @@ impl Change {
 }
 
 impl Known {
+    fn is_of(&self, canvas: &Canvas) -> bool {
+        self.generation == canvas.generation() && self.sums.grid.size == canvas.size()
+    }
+
     fn from_scratch(canvas: &Canvas, tile: u32) -> Known {
         let sums = Sums::from_scratch(canvas, tile, &[]);
-        Known { pdf: TilePdf::new(&sums.grid), sums }
+        Known { generation: canvas.generation(), pdf: TilePdf::new(&sums.grid), sums }
     }
 }
 
 impl Sampler for Change {
     fn choose(&mut self, now: Time, canvas: &Canvas, count: usize, requests: &mut Vec<Request>) {
-        if self.known.as_ref().is_some_and(|known| known.sums.grid.size != canvas.size()) {
+        if self.known.as_ref().is_some_and(|known| !known.is_of(canvas)) {
             self.known = None;
         }
         let known = self.known.get_or_insert_with(|| Known::from_scratch(canvas, self.tile));
@@ -76,10 +82,10 @@ impl Sampler for Change {
     }
 
     fn inspect(&self, now: Time, canvas: &Canvas) -> Insight {
-        let Some(Known { sums, .. }) = &self.known else { return Insight::default() };
-        if sums.grid.size != canvas.size() {
+        let Some(known) = self.known.as_ref().filter(|known| known.is_of(canvas)) else {
             return Insight::default();
-        }
+        };
+        let sums = &known.sums;
         let mut pdf = TilePdf::new(&sums.grid);
         sums.tile_probability(now, self.w_d, &mut pdf.probability);
         let pixels = 0..canvas.size().pixels() as u32;
@@ -201,13 +207,34 @@ mod tests {
         let mut canvas = Canvas::new(size);
         let mut sums = Sums::from_scratch(&canvas, 16, &[]);
         let mut rng = Rng::new(7);
+        let mut d = vec![0; size.pixels()];
         for i in 0..1_000_000u64 {
             let (pixel, now) = (rng.below(size.pixels() as u32), Time(i * 1111));
             let (previous, _) = canvas.replace(pixel, now, [0.0; 3]);
             let change = if rng.below(3) == 0 { 3.0 * rng.unit_f32() } else { 0.0 };
             sums.update(&Observation { pixel, now, previous, change });
+            d[pixel as usize] = fixed(change);
         }
-        assert_eq!(sums, Sums::from_scratch(&canvas, 16, &sums.change));
+        assert_eq!(sums, Sums::from_scratch(&canvas, 16, &d));
+    }
+
+    #[test]
+    fn a_resize_there_and_back_between_two_choices_starts_from_scratch() {
+        let (size, other) = (Size::new(40, 30), Size::new(20, 15));
+        let mut canvas = Canvas::new(size);
+        let mut sampler = Change::new(DEFAULT_W_D, 8, 1);
+        let mut requests = Vec::new();
+        sampler.choose(Time(1), &canvas, 500, &mut requests);
+        let observe = |request: &Request| {
+            let (previous, _) = canvas.replace(request.pixel, Time(50), [0.5; 3]);
+            Observation { pixel: request.pixel, now: Time(50), previous, change: 0.75 }
+        };
+        let observations: Vec<Observation> = requests.iter().map(observe).collect();
+        sampler.observe(&observations);
+        let canvas = canvas.resized(other).resized(size);
+        sampler.choose(Time(100), &canvas, 1, &mut requests);
+        let known = sampler.known.as_ref().expect("made by the choice");
+        assert_eq!(known.sums, Sums::from_scratch(&canvas, 8, &[]));
     }
 
     #[test]
@@ -271,7 +298,7 @@ mod tests {
         let canvas = Canvas::new(Size::new(512, 384));
         let mut sampler = Change::new(DEFAULT_W_D, DEFAULT_TILE, 1);
         sampler.choose(Time(1), &canvas, 10_000, &mut Vec::new());
-        let Known { sums, pdf } = sampler.known.as_ref().expect("made by the first choice");
+        let Known { sums, pdf, .. } = sampler.known.as_ref().expect("made by the first choice");
         let bytes = size_of_val(&sums.change[..])
             + size_of_val(&sums.tile_change[..])
             + size_of_val(&sums.tile_time[..])
