@@ -179,8 +179,12 @@ impl Experiment {
 
     /// As [`Experiment::read`], from text. The error says what is wrong and where in the text.
     pub fn parse(text: &str, folder: &Path) -> Result<Experiment, String> {
-        let file: ExperimentFile =
-            toml::from_str(text).map_err(|error| error.to_string().trim_end().to_string())?;
+        let file: ExperimentFile = toml::from_str(text).map_err(|error| {
+            let before = error.span().map_or("", |span| &text[..span.start]);
+            let line = before.matches('\n').count() + 1;
+            let column = before.chars().rev().take_while(|&c| c != '\n').count() + 1;
+            format!("line {line}, column {column}: {}", error.message())
+        })?;
         check(file, folder)
     }
 }
@@ -233,6 +237,11 @@ fn check(file: ExperimentFile, folder: &Path) -> Result<Experiment, String> {
     ] {
         if is_empty {
             return Err(format!("{key} is empty: at least one is needed"));
+        }
+    }
+    for (i, algorithm) in algorithms.iter().enumerate() {
+        if algorithms[..i].contains(algorithm) {
+            return Err(format!("algorithms: {:?} is there twice", algorithm.name()));
         }
     }
     let mut scenes: Vec<SceneSpec> = Vec::new();

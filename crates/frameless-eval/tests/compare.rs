@@ -152,7 +152,8 @@ fn an_interrupted_comparison_leaves_nothing_behind() {
 #[test]
 fn bad_experiments_are_refused_by_key_and_line() {
     for (from, to, part) in [
-        ("seeds = [1, 2]", "sedes = [1, 2]", "sedes"),
+        ("seeds = [1, 2]", "sedes = [1, 2]", "line 5, column 5: unknown field `sedes`"),
+        ("\"permutation\", ", "\"random\", ", "\"random\" is there twice"),
         ("width = 64", "width = 0", "width"),
         ("width = 64", "width = 64.5", "line 6"),
         ("width = 64\n    height = 48", "width = 8192\n    height = 8192", "GiB"),
