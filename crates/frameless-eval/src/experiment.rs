@@ -224,7 +224,7 @@ fn check(file: ExperimentFile, folder: &Path) -> Result<Experiment, String> {
     let is_possible = |rate: &f64| *rate > 0.0 && *rate <= MOST_SAMPLES_PER_SEC;
     if let Some(rate) = file.samples_per_sec.iter().find(|rate| !is_possible(rate)) {
         return Err(format!(
-            "samples_per_sec must be positive and at most {MOST_SAMPLES_PER_SEC}, got {rate}"
+            "samples_per_sec must be positive and at most {MOST_SAMPLES_PER_SEC}, got {rate:?}"
         ));
     }
     let algorithms: Vec<Algorithm> =

@@ -20,9 +20,10 @@ pub struct Ideals {
 /// How long a change counts as recent, for the RMSE over the changed region.
 const CHANGED_WITHIN_SECS: f64 = 0.1;
 
-/// Time of refresh `k`.
+/// Time of refresh `k`: (k + 1) / `display_hz`, rounded down like the clock's times, so that a batch that begins at a refresh
+/// comes after it.
 pub fn refresh_time(k: usize, display_hz: u32) -> Time {
-    Time(((k as u64 + 1) * 1_000_000_000).div_ceil(u64::from(display_hz)))
+    Time((k as u64 + 1) * 1_000_000_000 / u64::from(display_hz))
 }
 
 impl Ideals {
@@ -53,5 +54,24 @@ impl Ideals {
         });
         let changed = changed.collect();
         Some(Ideals { start: subject.ideal(0.0, size), changed, pictures })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use frameless::{BATCHES_PER_SEC, Clock, Engine, Function, SamplerKind, Size};
+
+    use super::*;
+
+    #[test]
+    fn no_sample_is_traced_at_or_after_the_refresh_that_shows_it() {
+        let per_refresh = u64::from(BATCHES_PER_SEC / 60);
+        let black = Function::new(|batch: &frameless::Batch| vec![[0.0; 3]; batch.requests.len()]);
+        let (clock, sampler) = (Clock::simulated(96_000.0), SamplerKind::Random.build(1));
+        let mut engine = Engine::new(Size::new(8, 8), clock, sampler, black);
+        for k in 0..150 {
+            engine.run_until(refresh_time(k, 60)).expect("black is finite");
+            assert_eq!(engine.counters().batches, (k as u64 + 1) * per_refresh, "refresh {k}");
+        }
     }
 }

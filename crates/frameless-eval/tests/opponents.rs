@@ -1,0 +1,75 @@
+//! The opponents, against what is known of them without running.
+
+use std::path::Path;
+
+use frameless_eval::{Algorithm, Cell, Experiment, Ideals, RunResult, Subject, run};
+
+fn experiment(scene: &str) -> Experiment {
+    let text = format!(
+        "title = \"opponents\"\nsamples_per_sec = [1]\nwidth = 64\nheight = 48\nduration_secs = 1.5\n\
+         [[scenes]]\nscene = \"{scene}\"\n[output]\nvideo = false"
+    );
+    Experiment::parse(&text, Path::new("")).expect("valid")
+}
+
+/// Runs each algorithm at the rate beside it.
+fn runs(scene: &str, algorithms: &[(&str, f64)]) -> Vec<RunResult> {
+    let experiment = experiment(scene);
+    let subject = Subject::load(&experiment.scenes[0]).expect("built in");
+    let ideals = Ideals::trace(&subject, &experiment, &|| (), &|| false).expect("not stopped");
+    let run_one = |&(name, samples_per_sec): &(&str, f64)| {
+        let cell = Cell {
+            scene: scene.into(),
+            algorithm: Algorithm::from_name(name).expect(name),
+            samples_per_sec,
+            seed: 1,
+        };
+        run(&cell, &experiment, &subject, &ideals, &mut |_, _| true).expect("finite colours")
+    };
+    algorithms.iter().map(run_one).collect()
+}
+
+/// So many samples trace the 64×48 picture once per millisecond.
+const FAST: f64 = 64.0 * 48.0 * 1000.0;
+const SLOW: f64 = 40_000.0;
+
+#[test]
+fn who_knows_the_ideal_chooses_best() {
+    let results = runs("sphere", &[("oracle-hold", SLOW), ("change", SLOW), ("random", SLOW)]);
+    let [oracle, change, random] = [0, 1, 2].map(|i: usize| results[i].rmse.mean);
+    assert!(oracle < change && change < random, "{oracle} {change} {random}");
+}
+
+#[test]
+fn where_full_resolution_fits_low_resolution_is_framed_rendering() {
+    let results = runs("sphere", &[("framed", FAST), ("lowres60", FAST), ("framed", SLOW)]);
+    assert_eq!(results[0].rmse.curve, results[1].rmse.curve);
+    // A frame that is 1 ms old is a quarter of a pixel behind; one that takes 77 ms is far behind.
+    let (fast, slow) = (results[0].rmse.mean, results[2].rmse.mean);
+    assert!(fast > 0.0 && fast < 0.2 * slow, "{fast} {slow}");
+}
+
+#[test]
+fn where_nothing_moves_any_more_frames_are_the_ideal() {
+    let algorithms = ["framed", "framed-single", "lowres60", "lowres30", "oracle-hold"];
+    for result in runs("settle", &algorithms.map(|name| (name, FAST))) {
+        assert!(result.rmse.curve[40] > 0.0, "{}: the sphere rolls at 0.68 s", result.algorithm);
+        assert_eq!(result.rmse.curve[89], 0.0, "{}", result.algorithm);
+    }
+}
+
+#[test]
+fn progressive_is_coarse_while_things_move_and_fine_at_rest() {
+    let results = runs("settle", &[("progressive", SLOW), ("lowres30", SLOW)]);
+    let (progressive, low) = (&results[0].rmse.curve, &results[1].rmse.curve);
+    assert!((progressive[40] / low[40] - 1.0).abs() < 0.3, "{} {}", progressive[40], low[40]);
+    // An antialiased picture never comes to zero against one of a single sample per pixel, which at 64×48 is far from
+    // antialiased.
+    assert!(progressive[89] < 0.8 * low[89], "{} {}", progressive[89], low[89]);
+}
+
+#[test]
+fn low_resolution_stays_coarse_at_rest() {
+    let results = runs("settle", &[("lowres60", SLOW), ("random", SLOW)]);
+    assert!(results[0].rmse.curve[89] > 10.0 * results[1].rmse.curve[89].max(1e-3));
+}
