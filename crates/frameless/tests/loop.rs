@@ -208,17 +208,25 @@ fn what_a_renderer_loses_is_chosen_again() {
     }
 }
 
-/// Answers the newest batch first.
+/// Always keeps one batch back and answers, in turn, the newest and the oldest of two.
 #[derive(Default)]
-struct Backwards(Vec<Batch>);
+struct OutOfOrder {
+    waiting: Vec<Batch>,
+    answered: u32,
+}
 
-impl Tracer for Backwards {
+impl Tracer for OutOfOrder {
     fn submit(&mut self, batch: Batch) {
-        self.0.push(batch);
+        self.waiting.push(batch);
     }
 
     fn collect(&mut self, _wait: bool) -> Option<Answer> {
-        let batch = self.0.pop()?;
+        if self.waiting.len() < 2 {
+            return None;
+        }
+        let newest = self.answered.is_multiple_of(2);
+        self.answered += 1;
+        let batch = self.waiting.remove(if newest { self.waiting.len() - 1 } else { 0 });
         let rgb = vec![[batch.id as f32; 3]; batch.requests.len()];
         Some(Answer::to(batch, rgb, Vec::new()))
     }
@@ -226,20 +234,18 @@ impl Tracer for Backwards {
 
 #[test]
 fn a_late_answer_never_overwrites_a_newer_one() {
-    let mut engine = Engine::new(
-        Size::new(1, 1),
-        Clock::real(),
-        SamplerKind::Random.build(1),
-        Backwards::default(),
-    );
+    let (clock, sampler) = (Clock::simulated(9_600.0), SamplerKind::Random.build(1));
+    let mut engine = Engine::new(Size::new(1, 1), clock, sampler, OutOfOrder::default());
     let mut newest = Time::ZERO;
-    for _ in 0..200 {
+    for _ in 0..20 {
         engine.step().expect("finite colours");
         let time = engine.canvas().time()[0];
         assert!(time >= newest);
         newest = time;
     }
-    assert!(engine.counters().dropped > 0, "the renderer was meant to be late");
+    // Batches 0 to 19 of 10 samples: of 19 answers every second one came late.
+    assert_eq!((engine.counters().kept, engine.counters().dropped), (100, 90));
+    assert_eq!(engine.canvas().rgb()[0], [19.0; 3], "the newest answer was batch 19");
 }
 
 #[test]
