@@ -34,7 +34,12 @@ fn table(results: &Results) -> String {
         let _ = writeln!(
             table,
             "{:12} {:<10} {:<6} {:.4}  {:.4}  {}",
-            run.scene, run.samples_per_sec, run.seed, run.rmse.mean, run.rmse.p95, run.algorithm
+            run.scene,
+            run.samples_per_sec,
+            run.seed,
+            run.rmse.mean.unwrap_or(f64::NAN),
+            run.rmse.p95.unwrap_or(f64::NAN),
+            run.algorithm
         );
     }
     table

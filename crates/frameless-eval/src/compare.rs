@@ -51,6 +51,7 @@ pub fn compare(
         title: experiment.title.clone(),
         unscored_refreshes: experiment.unscored,
         runs,
+        equal_quality: Vec::new(),
     };
     progress.stage("writing");
     let json = serde_json::to_string_pretty(&results).expect("plain data");

@@ -28,7 +28,9 @@ pub use ideal::{Ideals, refresh_time};
 pub use run::{Cell, run};
 
 pub use metrics::{Picture, changed_region, mean, quantile, rmse, rmse_where};
-pub use results::{Mean, RESULTS_VERSION, Results, Rmse, RunResult};
+pub use results::{
+    AtRest, Bound, Curve, EqualQuality, EventResult, RESULTS_VERSION, Results, RunResult,
+};
 
 pub use compare::{Progress, compare};
 pub use error::EvalError;

@@ -5,8 +5,8 @@ use crate::contender::Arena;
 use crate::error::EvalError;
 use crate::experiment::Experiment;
 use crate::ideal::{Ideals, refresh_time};
-use crate::metrics::{Picture, mean, quantile, rmse, rmse_where};
-use crate::results::{Mean, Rmse, RunResult};
+use crate::metrics::{Picture, rmse, rmse_where};
+use crate::results::{Curve, RunResult};
 use crate::subject::Subject;
 
 /// Which run.
@@ -60,7 +60,8 @@ fn summary(
     whole: Vec<f64>,
     changed: Vec<Option<f64>>,
 ) -> RunResult {
-    let scored = experiment.unscored..;
+    let every_refresh = |values: Vec<Option<f64>>| Curve::new(values, 1, experiment.unscored, 0.95);
+    let not_measured = || every_refresh(Vec::new());
     RunResult {
         scene: cell.scene.clone(),
         algorithm: cell.algorithm.name(),
@@ -70,11 +71,14 @@ fn summary(
         height: experiment.size.height,
         display_hz: experiment.display_hz,
         refreshes: experiment.refreshes,
-        rmse: Rmse {
-            mean: mean(whole[scored.clone()].iter().copied()).expect("a refresh is scored"),
-            p95: quantile(whole[scored.clone()].to_vec(), 0.95),
-            curve: whole,
-        },
-        rmse_changed: Mean { mean: mean(changed[scored].iter().flatten().copied()) },
+        rmse: every_refresh(whole.into_iter().map(Some).collect()),
+        psnr_db: not_measured(),
+        rmse_changed: every_refresh(changed),
+        ssim: not_measured(),
+        flip: not_measured(),
+        age_secs: not_measured(),
+        oldest_secs: 0.0,
+        events: Vec::new(),
+        at_rest: None,
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use frameless::{Answer, Batch, Request, Size, Tracer};
+use frameless::{Answer, Batch, Pose, Request, Size, Surface, Tracer};
 use frameless_scene::{Limits, View};
 use frameless_trace::{Moment, Settings, World};
 
@@ -31,9 +31,10 @@ impl Subject {
         Ok(Subject { world: Arc::new(World::new(Arc::new(scene))), camera: spec.camera.clone() })
     }
 
-    /// A renderer of this subject that traces on the calling thread.
-    pub fn tracer(&self) -> SubjectTracer<'_> {
-        SubjectTracer { subject: self, moment: self.world.moment(0.0), answer: None }
+    /// A renderer of this subject that traces on the calling thread; with `surfaces`, its answers say what was hit.
+    pub fn tracer(&self, surfaces: bool) -> SubjectTracer<'_> {
+        let moment = self.world.moment(0.0);
+        SubjectTracer { subject: self, moment, surfaces, answer: None }
     }
 
     /// The whole picture at exactly `secs`, linear RGB, one sample per pixel at its centre: what an
@@ -45,7 +46,24 @@ impl Subject {
 
     /// Linear RGB of any pixels at exactly `secs`.
     pub fn trace(&self, secs: f64, size: Size, requests: &[Request]) -> Vec<[f32; 3]> {
-        self.trace_moment(&self.world.moment(secs), secs, size, requests)
+        self.trace_moment(&self.world.moment(secs), secs, size, requests, false).0
+    }
+
+    /// Linear RGB of any pixels at exactly `secs`, and what was hit.
+    pub fn trace_surfaces(
+        &self,
+        secs: f64,
+        size: Size,
+        requests: &[Request],
+    ) -> (Vec<[f32; 3]>, Vec<Surface>) {
+        self.trace_moment(&self.world.moment(secs), secs, size, requests, true)
+    }
+
+    /// Where everything is in a picture of `size` at `secs`.
+    pub fn pose(&self, secs: f64, size: Size) -> Pose {
+        let (moment, mut pose) = (self.world.moment(secs), Pose::default());
+        moment.pose(&self.view(&moment, secs), size, &mut pose);
+        pose
     }
 
     /// Whether nothing that can be seen differs between two times: neither camera nor object nor light.
@@ -62,11 +80,16 @@ impl Subject {
         secs: f64,
         size: Size,
         requests: &[Request],
-    ) -> Vec<[f32; 3]> {
+        surfaces: bool,
+    ) -> (Vec<[f32; 3]>, Vec<Surface>) {
         let view = self.view(moment, secs);
-        let settings = Settings { surfaces: false, ..Settings::default() };
-        let trace = |request: &Request| self.world.trace(moment, &view, size, request, &settings).0;
-        requests.iter().map(trace).collect()
+        let settings = Settings { surfaces, ..Settings::default() };
+        let trace = |request: &Request| self.world.trace(moment, &view, size, request, &settings);
+        if surfaces {
+            requests.iter().map(trace).unzip()
+        } else {
+            (requests.iter().map(|request| trace(request).0).collect(), Vec::new())
+        }
     }
 
     fn view(&self, moment: &Moment, secs: f64) -> View {
@@ -81,6 +104,7 @@ impl Subject {
 pub struct SubjectTracer<'a> {
     subject: &'a Subject,
     moment: Moment,
+    surfaces: bool,
     answer: Option<Answer>,
 }
 
@@ -88,11 +112,24 @@ impl Tracer for SubjectTracer<'_> {
     fn submit(&mut self, batch: Batch) {
         let secs = batch.scene_secs;
         self.subject.world.update_moment(secs, &mut self.moment);
-        let rgb = self.subject.trace_moment(&self.moment, secs, batch.size, &batch.requests);
-        self.answer = Some(Answer::to(batch, rgb, Vec::new()));
+        let (rgb, surfaces) = self.subject.trace_moment(
+            &self.moment,
+            secs,
+            batch.size,
+            &batch.requests,
+            self.surfaces,
+        );
+        self.answer = Some(Answer::to(batch, rgb, surfaces));
     }
 
     fn collect(&mut self, _wait: bool) -> Option<Answer> {
         self.answer.take()
+    }
+
+    fn pose(&mut self, scene_secs: f64, size: Size, pose: &mut Pose) -> bool {
+        self.subject.world.update_moment(scene_secs, &mut self.moment);
+        let view = self.subject.view(&self.moment, scene_secs);
+        self.moment.pose(&view, size, pose);
+        true
     }
 }

@@ -1,8 +1,8 @@
 //! From a pixel to its ray.
 
-use frameless::{Request, Size};
+use frameless::{Projection as PictureFrom, Request, Size};
 use frameless_scene::{Projection, Scene, State, View};
-use glam::{Mat3A, Vec3A};
+use glam::{Affine3A, DAffine3, DMat4, DVec4, Mat3A, Vec3A};
 
 use crate::ray::Ray;
 
@@ -64,6 +64,49 @@ impl Camera {
     }
 }
 
+impl Camera {
+    /// Where points given in some coordinates are in the picture: the inverse of [`Camera::ray`]. Multiplied out in
+    /// double precision, so that distant scenes keep their sub-pixel positions.
+    pub(crate) fn picture_from(&self, world_from_object: &Affine3A) -> PictureFrom {
+        let world_from_camera = Affine3A { matrix3: self.axes, translation: self.position };
+        let camera_from_object = wide(&world_from_camera).inverse() * wide(world_from_object);
+        rows(self.picture_from_camera() * DMat4::from(camera_from_object))
+    }
+
+    /// Where directions are in the picture; `None` if all rays are parallel.
+    pub(crate) fn picture_from_direction(&self) -> Option<PictureFrom> {
+        let world_from_camera = Affine3A { matrix3: self.axes, translation: Vec3A::ZERO };
+        let camera_from_world = DMat4::from(wide(&world_from_camera).inverse());
+        self.is_perspective.then(|| rows(self.picture_from_camera() * camera_from_world))
+    }
+
+    /// Rows as in [`frameless::Projection`]; the camera looks along −z.
+    fn picture_from_camera(&self) -> DMat4 {
+        let [half_width, half_height] = self.half.map(f64::from);
+        let [cx, cy] = [f64::from(self.size.width) / 2.0, f64::from(self.size.height) / 2.0];
+        let (along_z, constant) = if self.is_perspective { (-1.0, 0.0) } else { (0.0, 1.0) };
+        DMat4::from_cols(
+            DVec4::new(cx / half_width, 0.0, 0.0, 0.0),
+            DVec4::new(0.0, -cy / half_height, 0.0, 0.0),
+            DVec4::new(cx * along_z, cy * along_z, -1.0, along_z),
+            DVec4::new(cx * constant, cy * constant, 0.0, constant),
+        )
+    }
+}
+
+fn wide(affine: &Affine3A) -> DAffine3 {
+    let columns = [affine.matrix3.x_axis, affine.matrix3.y_axis, affine.matrix3.z_axis];
+    let [x, y, z] = columns.map(|column| glam::Vec3::from(column).as_dvec3());
+    DAffine3::from_mat3_translation(
+        glam::DMat3::from_cols(x, y, z),
+        glam::Vec3::from(affine.translation).as_dvec3(),
+    )
+}
+
+fn rows(matrix: DMat4) -> PictureFrom {
+    PictureFrom(std::array::from_fn(|row| matrix.row(row).as_vec4().to_array()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -78,6 +121,40 @@ mod tests {
         let top_left = Request { pixel: 0, offset: [-0.5, -0.5] };
         let centre = Request { pixel: size.index(2, 1), offset: [-0.5, -0.5] };
         [camera.ray(&top_left), camera.ray(&centre)]
+    }
+
+    #[test]
+    fn projecting_is_the_inverse_of_the_ray() {
+        let world_from_camera = Affine3A::from_translation(Vec3::new(900.0, 2.0, -3.0))
+            * Affine3A::from_rotation_y(0.7)
+            * Affine3A::from_rotation_x(-0.3);
+        let world_from_object = Affine3A::from_translation(Vec3::new(880.0, 1.0, 5.0))
+            * Affine3A::from_rotation_z(1.1)
+            * Affine3A::from_scale(Vec3::new(2.0, 0.5, 1.0));
+        let size = Size::new(640, 360);
+        for projection in
+            [Projection::Perspective { yfov_rad: 0.9 }, Projection::Orthographic { ymag: 3.0 }]
+        {
+            let camera = Camera::new(&View { world_from_camera, projection }, size);
+            for pixel in [0, 1234, size.index(320, 180), size.index(639, 359)] {
+                let request = Request { pixel, offset: [0.25, -0.125] };
+                let (ray, expected) = (camera.ray(&request), request.position_px(size));
+                let point = ray.origin + 7.0 * ray.direction;
+                let local = world_from_object.inverse().transform_point3a(point);
+                let picture_from_object = camera.picture_from(&world_from_object);
+                let there = picture_from_object.project(local.to_array()).expect("in front");
+                // Positions near 900 m are exact to 1/16,000 m.
+                let off = (0..2).map(|k| (there.px[k] - expected[k]).abs()).fold(0.0, f32::max);
+                assert!(off < 0.03, "{projection:?} {expected:?}: {there:?}");
+                let depth = 7.0 * ray.direction.dot(-camera.axes.z_axis);
+                assert!((there.depth - depth).abs() < 1e-3, "{projection:?}: {there:?}, {depth}");
+                if let Some(from_direction) = camera.picture_from_direction() {
+                    let there = from_direction.project(ray.direction.to_array()).expect("ahead");
+                    let off = (0..2).map(|k| (there.px[k] - expected[k]).abs()).fold(0.0, f32::max);
+                    assert!(off < 1e-3, "{expected:?}: {there:?}");
+                }
+            }
+        }
     }
 
     #[test]

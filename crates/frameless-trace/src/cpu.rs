@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::sync::{Arc, Mutex};
 
-use frameless::{Answer, Batch, Request, Surface, Tracer};
+use frameless::{Answer, Batch, Pose, Request, Size, Surface, Tracer};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
@@ -117,6 +117,15 @@ impl Tracer for CpuTracer {
         };
         self.under_way.pop_front();
         Some(answer)
+    }
+
+    fn pose(&mut self, scene_secs: f64, size: Size, pose: &mut Pose) -> bool {
+        let mut workspace = self.shared.take_workspace(scene_secs);
+        self.shared.world.update_moment(scene_secs, &mut workspace.moment);
+        let view = self.view.at(self.shared.world.scene(), workspace.moment.state());
+        workspace.moment.pose(&view, size, pose);
+        self.shared.idle().push(workspace);
+        true
     }
 }
 

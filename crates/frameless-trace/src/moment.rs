@@ -1,7 +1,9 @@
 //! The world at one time.
 
-use frameless_scene::{Geometry, State};
+use frameless::{Pose, Size};
+use frameless_scene::{Geometry, State, View};
 
+use crate::camera::Camera;
 use crate::lights::{LightNow, lights_now};
 use crate::top::{Placed, Shape, Targets, Top};
 use crate::world::World;
@@ -21,6 +23,17 @@ impl Moment {
     /// The scene's state that this moment shows.
     pub fn state(&self) -> &State {
         &self.state
+    }
+
+    /// Fills in where every instance is in a picture of `size`.
+    pub fn pose(&self, view: &View, size: Size, pose: &mut Pose) {
+        let camera = Camera::new(view, size);
+        pose.picture_from_object.clear();
+        let instances =
+            self.placed.iter().map(|placed| camera.picture_from(&placed.world_from_object));
+        pose.picture_from_object.extend(instances);
+        pose.picture_from_sky = camera.picture_from_direction();
+        pose.deformed.clear();
     }
 
     pub(crate) fn placed(&self, instance: u32) -> &Placed {

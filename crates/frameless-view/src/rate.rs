@@ -1,6 +1,6 @@
 //! How often each pixel is traced: a renderer that counts its answers.
 
-use frameless::{Answer, Batch, Size, Time, Tracer};
+use frameless::{Answer, Batch, Pose, Size, Time, Tracer};
 
 /// Samples per second of every pixel, smoothed over about a second.
 ///
@@ -99,6 +99,10 @@ impl<T: Tracer> Tracer for Counted<T> {
             rate.count(&answer);
         }
         Some(answer)
+    }
+
+    fn pose(&mut self, scene_secs: f64, size: Size, pose: &mut Pose) -> bool {
+        self.tracer.pose(scene_secs, size, pose)
     }
 }
 

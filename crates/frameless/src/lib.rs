@@ -28,6 +28,7 @@ mod clock;
 mod display;
 mod engine;
 mod hold;
+mod pose;
 mod rng;
 mod sample;
 mod sampler;
@@ -45,6 +46,7 @@ pub use sample::{Answer, Batch, Request, Size, Surface};
 pub use sampler::{Insight, Observation, Sampler};
 pub use samplers::{Change, DEFAULT_TILE, DEFAULT_W_D, Permutation, Random, SamplerKind};
 
+pub use pose::{Deformed, Pose, Projected, Projection};
 pub use tracer::{Function, Tracer};
 
 pub use canvas::Canvas;

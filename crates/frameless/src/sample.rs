@@ -117,7 +117,8 @@ pub struct Surface {
     pub object: u32,
     /// Which primitive of the object; 0 where there is only one.
     pub primitive: u32,
-    /// Hit point in the object's coordinates. For the sky: the ray's direction in world coordinates.
+    /// Hit point in the object's coordinates. For the sky: the ray's direction in world coordinates. For an object that
+    /// deforms (see [`crate::Pose::deformed`]): the barycentric weights of the primitive's three vertices.
     pub position: [f32; 3],
     /// Unit shading normal in the object's coordinates, on the side that was hit.
     pub normal: [f32; 3],

@@ -1,6 +1,6 @@
 //! The renderer's side of the contract.
 
-use crate::{Answer, Batch};
+use crate::{Answer, Batch, Pose, Size};
 
 /// A renderer: takes batches of pixels, gives their colours back, now or later.
 ///
@@ -30,6 +30,12 @@ pub trait Tracer {
     /// The next answer, if there is one. With `wait`, wait for it as long as a batch is under way that may
     /// still be answered; `None` then means that nothing more will come.
     fn collect(&mut self, wait: bool) -> Option<Answer>;
+
+    /// Fill in where everything is in a picture of `size` at `scene_secs`, for a renderer that returns surfaces and can
+    /// tell; its samples are then carried along as things move. Returns whether it can; the default cannot.
+    fn pose(&mut self, _scene_secs: f64, _size: Size, _pose: &mut Pose) -> bool {
+        false
+    }
 }
 
 impl<T: Tracer + ?Sized> Tracer for Box<T> {
@@ -39,6 +45,10 @@ impl<T: Tracer + ?Sized> Tracer for Box<T> {
 
     fn collect(&mut self, wait: bool) -> Option<Answer> {
         (**self).collect(wait)
+    }
+
+    fn pose(&mut self, scene_secs: f64, size: Size, pose: &mut Pose) -> bool {
+        (**self).pose(scene_secs, size, pose)
     }
 }
 

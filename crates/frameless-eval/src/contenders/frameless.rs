@@ -15,7 +15,9 @@ impl<'a> Frameless<'a> {
     pub(crate) fn new(arena: Arena<'a>, sampler: Box<dyn Sampler>) -> Frameless<'a> {
         let canvas = Canvas::from_picture(arena.size, arena.ideals.start.clone());
         let clock = Clock::simulated(arena.samples_per_sec);
-        Frameless { engine: Engine::with_canvas(canvas, clock, sampler, arena.subject.tracer()) }
+        Frameless {
+            engine: Engine::with_canvas(canvas, clock, sampler, arena.subject.tracer(false)),
+        }
     }
 }
 

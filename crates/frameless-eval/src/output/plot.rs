@@ -35,7 +35,10 @@ fn draw(
 ) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
     let mut algorithms: Vec<&str> = runs.iter().map(|run| run.algorithm.as_str()).collect();
     algorithms.dedup();
-    let highest = runs.iter().flat_map(|run| &run.rmse.curve).fold(0.0, |a: f64, &b| a.max(b));
+    let highest = runs
+        .iter()
+        .flat_map(|run| run.rmse.values.iter().flatten())
+        .fold(0.0, |a: f64, &b| a.max(b));
     let secs_of = |run: &RunResult, k: usize| (k + 1) as f64 / f64::from(run.display_hz);
     let longest = runs.iter().map(|run| secs_of(run, run.refreshes - 1)).fold(0.0, f64::max);
 
@@ -58,9 +61,15 @@ fn draw(
         for (algorithm, colour) in algorithms.iter().zip(COLOURS.into_iter().cycle()) {
             let style = colour.stroke_width(2);
             let seeds: Vec<_> = runs.iter().filter(|run| run.algorithm == *algorithm).collect();
-            let mean = seeds.iter().map(|run| run.rmse.mean).sum::<f64>() / seeds.len() as f64;
+            let mean =
+                seeds.iter().filter_map(|run| run.rmse.mean).sum::<f64>() / seeds.len() as f64;
             for (k, run) in seeds.into_iter().enumerate() {
-                let points = run.rmse.curve.iter().enumerate().map(|(k, &e)| (secs_of(run, k), e));
+                let points = run
+                    .rmse
+                    .values
+                    .iter()
+                    .enumerate()
+                    .filter_map(|(k, &e)| Some((secs_of(run, k), e?)));
                 let curve = chart.draw_series(LineSeries::new(points, style))?;
                 if k == 0 {
                     let line = move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style);
