@@ -1,6 +1,6 @@
 //! Who competes, by name.
 
-use frameless::SamplerKind;
+use frameless::{ReconstructionKind, SamplerKind};
 
 use crate::contender::{Arena, Contender};
 use crate::contenders::{Framed, FramedSingle, Frameless, LowRes, OracleHold, Progressive};
@@ -8,8 +8,8 @@ use crate::contenders::{Framed, FramedSingle, Frameless, LowRes, OracleHold, Pro
 /// A way of making pictures from samples.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Algorithm {
-    /// A frameless sampler, shown by `hold`.
-    Frameless(SamplerKind),
+    /// A frameless sampler, and how its samples are shown.
+    Frameless(SamplerKind, ReconstructionKind),
     /// `framed`: whole frames, double-buffered.
     Framed,
     /// `framed-single`: whole frames, visible while they are drawn.
@@ -45,7 +45,7 @@ impl Algorithm {
         if let Some((_, algorithm)) = PLAIN.into_iter().find(|(plain, _)| *plain == name) {
             return Ok(algorithm);
         }
-        let sampler = name.strip_suffix("+hold").unwrap_or(name);
+        let (sampler, reconstruction) = split_reconstruction(name);
         let (head, parameters) = match sampler.split_once('(') {
             Some((head, rest)) => (head, Some(rest)),
             None => (sampler, None),
@@ -57,8 +57,10 @@ impl Algorithm {
             format!("unknown algorithm {name:?}; there are: {}", known.join(", "))
         })?;
         match (kind, parameters) {
-            (kind, None) => Ok(Algorithm::Frameless(kind)),
-            (SamplerKind::Change { .. }, Some(text)) => parse_change(name, text),
+            (kind, None) => Ok(Algorithm::Frameless(kind, reconstruction)),
+            (SamplerKind::Change { .. }, Some(text)) => {
+                Ok(Algorithm::Frameless(parse_change(name, text)?, reconstruction))
+            }
             (_, Some(_)) => Err(format!("algorithm {name:?}: {head} has no parameters")),
         }
     }
@@ -66,11 +68,13 @@ impl Algorithm {
     /// The name that [`Algorithm::from_name`] understands.
     pub fn name(&self) -> String {
         match self {
-            Algorithm::Frameless(kind) if *kind == SamplerKind::CHANGE => kind.name().into(),
-            Algorithm::Frameless(SamplerKind::Change { w_d, tile }) => {
-                format!("change(w_d={w_d},tile={tile})")
+            Algorithm::Frameless(sampler, reconstruction) => {
+                let suffix = match reconstruction {
+                    ReconstructionKind::Hold if *sampler != SamplerKind::Adaptive => "",
+                    other => suffix(*other),
+                };
+                sampler_name(sampler) + suffix
             }
-            Algorithm::Frameless(kind) => kind.name().into(),
             plain => {
                 let found = PLAIN.into_iter().find(|(_, algorithm)| algorithm == plain);
                 found.expect("every other algorithm is listed").0.into()
@@ -81,7 +85,9 @@ impl Algorithm {
     /// The algorithm at work, at time 0.
     pub(crate) fn contender<'a>(&self, arena: Arena<'a>) -> Box<dyn Contender + 'a> {
         match *self {
-            Algorithm::Frameless(kind) => Box::new(Frameless::new(arena, kind.build(arena.seed))),
+            Algorithm::Frameless(kind, reconstruction) => {
+                Box::new(Frameless::new(arena, kind.build(arena.seed), reconstruction))
+            }
             Algorithm::Framed => Box::new(Framed::new(arena)),
             Algorithm::FramedSingle => Box::new(FramedSingle::new(arena)),
             Algorithm::LowRes { refreshes_per_frame } => {
@@ -93,7 +99,32 @@ impl Algorithm {
     }
 }
 
-fn parse_change(name: &str, text: &str) -> Result<Algorithm, String> {
+const SUFFIXES: [(&str, ReconstructionKind); 4] = [
+    ("+hold", ReconstructionKind::Hold),
+    ("+filter", ReconstructionKind::Filter),
+    ("+reproject+deep", ReconstructionKind::Deep),
+    ("+reproject", ReconstructionKind::Reproject),
+];
+
+fn split_reconstruction(name: &str) -> (&str, ReconstructionKind) {
+    let found = SUFFIXES.iter().find_map(|(suffix, kind)| Some((name.strip_suffix(suffix)?, *kind)));
+    found.unwrap_or((name, ReconstructionKind::Hold))
+}
+
+fn suffix(kind: ReconstructionKind) -> &'static str {
+    SUFFIXES.iter().find(|(_, k)| *k == kind).expect("every kind has one").0
+}
+
+fn sampler_name(kind: &SamplerKind) -> String {
+    match kind {
+        SamplerKind::Change { w_d, tile } if *kind != SamplerKind::CHANGE => {
+            format!("change(w_d={w_d},tile={tile})")
+        }
+        kind => kind.name().into(),
+    }
+}
+
+fn parse_change(name: &str, text: &str) -> Result<SamplerKind, String> {
     let wrong = || format!("algorithm {name:?}: wanted change(w_d=0.9,tile=16)");
     let SamplerKind::Change { mut w_d, mut tile } = SamplerKind::CHANGE else {
         return Err(wrong());
@@ -108,7 +139,7 @@ fn parse_change(name: &str, text: &str) -> Result<Algorithm, String> {
     if !(0.0..=1.0).contains(&w_d) || tile == 0 {
         return Err(format!("algorithm {name:?}: w_d must be in [0, 1] and tile at least 1"));
     }
-    Ok(Algorithm::Frameless(SamplerKind::Change { w_d, tile }))
+    Ok(SamplerKind::Change { w_d, tile })
 }
 
 #[cfg(test)]

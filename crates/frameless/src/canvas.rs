@@ -9,12 +9,19 @@ pub struct Canvas {
     generation: u32,
     rgb: Vec<[f32; 3]>,
     time: Vec<Time>,
+    known: Vec<bool>,
+    holes: Vec<u32>,
+    holes_found: u64,
 }
 
 impl Canvas {
     /// A black canvas on which no pixel has been traced yet (all times [`Time::ZERO`]).
     pub fn new(size: Size) -> Canvas {
-        Canvas::from_picture(size, vec![[0.0; 3]; size.pixels()])
+        let mut canvas = Canvas::from_picture(size, vec![[0.0; 3]; size.pixels()]);
+        canvas.known.fill(false);
+        canvas.holes = coarse_to_fine(size);
+        canvas.holes_found = 1;
+        canvas
     }
 
     /// A canvas that starts with a whole picture traced at [`Time::ZERO`].
@@ -23,7 +30,15 @@ impl Canvas {
     /// If `rgb` (linear, row-major) does not have one colour per pixel.
     pub fn from_picture(size: Size, rgb: Vec<[f32; 3]>) -> Canvas {
         assert_eq!(rgb.len(), size.pixels(), "one colour per pixel");
-        Canvas { size, generation: 0, rgb, time: vec![Time::ZERO; size.pixels()] }
+        Canvas {
+            size,
+            generation: 0,
+            rgb,
+            time: vec![Time::ZERO; size.pixels()],
+            known: vec![true; size.pixels()],
+            holes: Vec::new(),
+            holes_found: 0,
+        }
     }
 
     /// Width and height.
@@ -47,6 +62,32 @@ impl Canvas {
         &self.time
     }
 
+    /// Per pixel whether anything is known of what it shows, row-major: not before it is traced first, and not where
+    /// something has moved away, until what was behind it has been traced.
+    pub fn known(&self) -> &[bool] {
+        &self.known
+    }
+
+    /// Pixels of which nothing was known when this was last found out, the most urgent first. Some may have been traced
+    /// since.
+    pub fn holes(&self) -> &[u32] {
+        &self.holes
+    }
+
+    /// How often [`Canvas::holes`] has been made anew.
+    pub fn holes_found(&self) -> u64 {
+        self.holes_found
+    }
+
+    /// What every pixel shows has been found out anew: when it was traced, and where nothing is known.
+    pub(crate) fn update(&mut self, holes: &mut Vec<u32>, mut state: impl FnMut(usize) -> (Time, bool)) {
+        for (pixel, (time, known)) in self.time.iter_mut().zip(&mut self.known).enumerate() {
+            (*time, *known) = state(pixel);
+        }
+        std::mem::swap(&mut self.holes, holes);
+        self.holes_found += 1;
+    }
+
     /// Write a sample; returns the time and colour that it replaces.
     #[inline]
     pub(crate) fn replace(&mut self, pixel: u32, time: Time, rgb: [f32; 3]) -> (Time, [f32; 3]) {
@@ -54,6 +95,7 @@ impl Canvas {
         let replaced = (self.time[i], self.rgb[i]);
         self.time[i] = time;
         self.rgb[i] = rgb;
+        self.known[i] = true;
         replaced
     }
 
@@ -76,8 +118,23 @@ impl Canvas {
             generation: self.generation.wrapping_add(1),
             rgb: source.iter().map(|&i| self.rgb[i]).collect(),
             time: source.iter().map(|&i| self.time[i]).collect(),
+            known: source.iter().map(|&i| self.known[i]).collect(),
+            holes: coarse_to_fine(size),
+            holes_found: self.holes_found + 1,
         }
     }
+}
+
+/// All pixels in an order that covers the picture evenly at every moment: bit-reversed blocks of 32×32, interleaved (Bayer
+/// 1973).
+fn coarse_to_fine(size: Size) -> Vec<u32> {
+    let mut pixels: Vec<u32> = (0..size.pixels() as u32).collect();
+    let rank = |&pixel: &u32| {
+        let (x, y) = size.xy(pixel);
+        crate::bayer::rank(x, y, 5)
+    };
+    pixels.sort_by_cached_key(rank);
+    pixels
 }
 
 #[cfg(test)]

@@ -3,8 +3,8 @@
 use thiserror::Error;
 
 use crate::{
-    Answer, Batch, Canvas, Clock, Display, Observation, Request, Sampler, Size, Time, Timeline,
-    Tracer,
+    Answer, Batch, Canvas, Clock, Display, Hold, Kept, Observation, Pose, Reconstruction, Refresh,
+    Request, Sampler, Size, Surface, Time, Timeline, Tracer,
 };
 
 /// Everything that runs a frameless picture: a clock, a sampler, a renderer, and the canvas between them.
@@ -14,6 +14,7 @@ pub struct Engine<T> {
     display: Display,
     canvas: Canvas,
     sampler: Box<dyn Sampler>,
+    reconstruction: Box<dyn Reconstruction>,
     tracer: T,
     // Samples submitted and not yet answered.
     outstanding: usize,
@@ -21,18 +22,21 @@ pub struct Engine<T> {
     // Reused from batch to batch.
     spare_requests: Vec<Request>,
     replaced: Replaced,
+    changes: Vec<f32>,
     observations: Vec<Observation>,
+    pose: Pose,
+    picture: Vec<[f32; 3]>,
 }
 
 /// The samples of one answer and what they took the place of, in the answer's order.
 #[derive(Default)]
 struct Replaced {
-    /// Pixel, and when it had been traced before.
-    places: Vec<(u32, Time)>,
+    requests: Vec<Request>,
+    /// When the pixel had been traced before, and whether anything was known of it.
+    before: Vec<(Time, bool)>,
     old: Vec<[f32; 3]>,
     new: Vec<[f32; 3]>,
-    /// Scratch memory of [`Display::changes`].
-    squares: Vec<f32>,
+    surfaces: Vec<Surface>,
 }
 
 /// What the loop has done so far.
@@ -91,6 +95,16 @@ pub enum EngineError {
 /// Batches under way at once on the real clock: while one is traced the next is chosen.
 const PIPELINE_DEPTH: usize = 2;
 
+impl Replaced {
+    fn clear(&mut self) {
+        self.requests.clear();
+        self.before.clear();
+        self.old.clear();
+        self.new.clear();
+        self.surfaces.clear();
+    }
+}
+
 impl<T: Tracer> Engine<T> {
     /// A loop over a black canvas.
     pub fn new(size: Size, clock: Clock, sampler: Box<dyn Sampler>, tracer: T) -> Engine<T> {
@@ -110,12 +124,16 @@ impl<T: Tracer> Engine<T> {
             display: Display::default(),
             canvas,
             sampler,
+            reconstruction: Box::new(Hold::default()),
             tracer,
             outstanding: 0,
             counters: Counters::default(),
             spare_requests: Vec::new(),
             replaced: Replaced::default(),
+            changes: Vec::new(),
             observations: Vec::new(),
+            pose: Pose::default(),
+            picture: Vec::new(),
         }
     }
 
@@ -173,6 +191,7 @@ impl<T: Tracer> Engine<T> {
         let mut requests = std::mem::take(&mut self.spare_requests);
         requests.clear();
         self.sampler.choose(now, &self.canvas, count, &mut requests);
+        self.reconstruction.aim(now, &self.canvas, &mut requests);
         self.outstanding += requests.len();
         self.tracer.submit(Batch {
             id: self.counters.batches,
@@ -213,9 +232,7 @@ impl<T: Tracer> Engine<T> {
     /// Only memory is moved here, in a loop so short that many pixels are fetched at once; what the samples
     /// changed is worked out afterwards from `replaced`, which lies in the cache.
     fn keep(&mut self, answer: &Answer) -> Result<(), EngineError> {
-        self.replaced.places.clear();
-        self.replaced.old.clear();
-        self.replaced.new.clear();
+        self.replaced.clear();
         let (requests, colours) = (answer.requests.len(), answer.rgb.len());
         let surfaces = answer.surfaces.len();
         if colours != requests || (surfaces != requests && surfaces != 0) {
@@ -226,7 +243,7 @@ impl<T: Tracer> Engine<T> {
             self.counters.dropped += requests as u64;
             return Ok(());
         }
-        for (request, &rgb) in answer.requests.iter().zip(&answer.rgb) {
+        for (i, (request, &rgb)) in answer.requests.iter().zip(&answer.rgb).enumerate() {
             let pixel = request.pixel;
             if pixel as usize >= size.pixels() {
                 let Size { width, height } = size;
@@ -240,25 +257,56 @@ impl<T: Tracer> Engine<T> {
                 self.counters.dropped += 1;
                 continue;
             }
+            let known = self.canvas.known()[pixel as usize];
             let (previous, old) = self.canvas.replace(pixel, answer.now, rgb);
-            self.replaced.places.push((pixel, previous));
+            self.replaced.requests.push(*request);
+            self.replaced.before.push((previous, known));
             self.replaced.old.push(old);
             self.replaced.new.push(rgb);
+            self.replaced.surfaces.extend(answer.surfaces.get(i));
         }
         Ok(())
     }
 
     /// Tells the sampler what the samples just kept have changed. Returns how many they are.
     fn observe(&mut self, now: Time) -> usize {
-        let Replaced { places, old, new, squares } = &mut self.replaced;
-        let changes = self.display.changes(new, old, squares);
+        let Replaced { requests, before, old, new, surfaces } = &self.replaced;
+        let kept = Kept { now, size: self.canvas.size(), requests, new, old, surfaces };
+        self.changes.clear();
+        self.reconstruction.keep(&kept, &self.display, &mut self.changes);
         self.observations.clear();
-        let observation =
-            |(&(pixel, previous), change)| Observation { pixel, now, previous, change };
-        self.observations.extend(places.iter().zip(changes).map(observation));
-        self.sampler.observe(&self.observations);
+        let samples = requests.iter().zip(before).zip(&self.changes);
+        self.observations.extend(samples.map(|((request, &(previous, known)), &change)| {
+            Observation { pixel: request.pixel, now, previous, known, change }
+        }));
+        self.sampler.observe(&self.canvas, &self.observations);
         self.counters.kept += self.observations.len() as u64;
         self.observations.len()
+    }
+
+    /// The picture at `now`, display-referred sRGB in [0, 1], row-major.
+    pub fn refresh(&mut self, now: Time) -> &[[f32; 3]] {
+        let (secs, size) = (self.timeline.scene_secs(now), self.canvas.size());
+        let pose = self.tracer.pose(secs, size, &mut self.pose).then_some(&self.pose);
+        let rates = self.sampler.rates();
+        let refresh = Refresh { now, pose, display: &self.display, rates };
+        self.reconstruction.refresh(&refresh, &mut self.canvas, &mut self.picture);
+        &self.picture
+    }
+
+    /// Begin with a picture that is known already: its samples count as traced at their time, and nobody is told of changes.
+    ///
+    /// # Errors
+    /// As [`Engine::step`].
+    pub fn start_with(&mut self, answer: &Answer) -> Result<(), EngineError> {
+        self.keep(answer)?;
+        self.observe(answer.now);
+        Ok(())
+    }
+
+    /// Make pictures in another way from now on. What the canvas holds stays; surfaces are learned anew.
+    pub fn set_reconstruction(&mut self, reconstruction: Box<dyn Reconstruction>) {
+        self.reconstruction = reconstruction;
     }
 
     /// The present time of the engine's clock.

@@ -22,13 +22,15 @@
 //! ```
 
 mod alias;
+mod bayer;
 mod bilinear;
 mod canvas;
 mod clock;
 mod display;
 mod engine;
-mod hold;
 mod pose;
+mod rates;
+mod reconstruction;
 mod rng;
 mod sample;
 mod sampler;
@@ -38,13 +40,14 @@ mod tile_pdf;
 mod time;
 mod timeline;
 mod tracer;
+mod wide;
 
 pub use time::Time;
 
 pub use sample::{Answer, Batch, Request, Size, Surface};
 
 pub use sampler::{Insight, Observation, Sampler};
-pub use samplers::{Change, DEFAULT_TILE, DEFAULT_W_D, Permutation, Random, SamplerKind};
+pub use samplers::{Adaptive, Change, DEFAULT_TILE, DEFAULT_W_D, Permutation, Random, SamplerKind};
 
 pub use pose::{Deformed, Pose, Projected, Projection};
 pub use tracer::{Function, Tracer};
@@ -56,6 +59,9 @@ pub use engine::{Counters, Engine, EngineError};
 pub use timeline::Timeline;
 
 pub use display::Display;
-pub use hold::{hold, hold_into};
+pub use rates::Rates;
+pub use reconstruction::{
+    Filter, Hold, Kept, Reconstruction, ReconstructionKind, Refresh, Reproject, hold, hold_into,
+};
 
 pub use rng::Rng;

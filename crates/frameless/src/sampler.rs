@@ -1,6 +1,6 @@
 //! The contract between the loop and whoever decides which pixels are traced next.
 
-use crate::{Canvas, Request, Time};
+use crate::{Canvas, Rates, Request, Time};
 
 /// What became of one sample, as told to the sampler.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,9 +9,12 @@ pub struct Observation {
     pub pixel: u32,
     /// When it was traced.
     pub now: Time,
-    /// When it had been traced before; [`Time::ZERO`] if never.
+    /// When what the pixel showed had been traced; [`Time::ZERO`] if never.
     pub previous: Time,
-    /// d = Σₖ (newₖ − oldₖ)² over display-referred sRGB in [0, 1]: between 0 (nothing changed) and 3.
+    /// Whether anything was known of the pixel; if not, `change` says nothing. See [`Canvas::known`].
+    pub known: bool,
+    /// d = Σₖ (newₖ − oldₖ)² over display-referred sRGB in [0, 1], old being what the picture showed there: between 0 (nothing
+    /// changed) and 3.
     pub change: f32,
 }
 
@@ -27,9 +30,14 @@ pub trait Sampler: Send {
     /// any time in it. Its size may differ from call to call, see [`Canvas::generation`].
     fn choose(&mut self, now: Time, canvas: &Canvas, count: usize, requests: &mut Vec<Request>);
 
-    /// Learn from samples that have just been written to the canvas.
-    fn observe(&mut self, observations: &[Observation]) {
-        let _ = observations;
+    /// Learn from samples that have just been written to `canvas`.
+    fn observe(&mut self, canvas: &Canvas, observations: &[Observation]) {
+        let _ = (canvas, observations);
+    }
+
+    /// How fast each part of the picture changes, if the sampler learns it; reconstructions weigh samples with it.
+    fn rates(&self) -> Option<&Rates> {
+        None
     }
 
     /// What the sampler knows of the picture, for overlays and experiments. Slow; not for the loop.

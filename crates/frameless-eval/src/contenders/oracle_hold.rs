@@ -8,7 +8,7 @@
 //! smallest errors come first, so that the largest are freshest at the refresh. It is greedy, refresh by
 //! refresh, and so no strict bound.
 
-use frameless::{Canvas, Display, Request, Sampler, Time};
+use frameless::{ReconstructionKind, Canvas, Display, Request, Sampler, Time};
 
 use crate::contender::Arena;
 use crate::contenders::Frameless;
@@ -35,7 +35,7 @@ impl OracleHold {
             planned_for: None,
             plan: Vec::new(),
         };
-        Frameless::new(arena, Box::new(oracle))
+        Frameless::new(arena, Box::new(oracle), ReconstructionKind::Hold)
     }
 
     /// The pixels with the largest errors against the ideal of `refresh`, the largest first.

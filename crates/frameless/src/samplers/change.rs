@@ -73,7 +73,7 @@ impl Sampler for Change {
         known.pdf.draw(&mut self.rng, count, requests);
     }
 
-    fn observe(&mut self, observations: &[Observation]) {
+    fn observe(&mut self, _canvas: &Canvas, observations: &[Observation]) {
         // Before the first choice there is nothing to update: the sums will be made from the canvas.
         let Some(known) = &mut self.known else { return };
         for observation in observations {
@@ -189,7 +189,7 @@ mod tests {
     use crate::Size;
 
     fn observation(pixel: u32, now: u64, previous: u64, change: f32) -> Observation {
-        Observation { pixel, now: Time(now), previous: Time(previous), change }
+        Observation { pixel, now: Time(now), previous: Time(previous), known: true, change }
     }
 
     #[test]
@@ -212,7 +212,7 @@ mod tests {
             let (pixel, now) = (rng.below(size.pixels() as u32), Time(i * 1111));
             let (previous, _) = canvas.replace(pixel, now, [0.0; 3]);
             let change = if rng.below(3) == 0 { 3.0 * rng.unit_f32() } else { 0.0 };
-            sums.update(&Observation { pixel, now, previous, change });
+            sums.update(&Observation { pixel, now, previous, known: true, change });
             d[pixel as usize] = fixed(change);
         }
         assert_eq!(sums, Sums::from_scratch(&canvas, 16, &d));
@@ -227,10 +227,10 @@ mod tests {
         sampler.choose(Time(1), &canvas, 500, &mut requests);
         let observe = |request: &Request| {
             let (previous, _) = canvas.replace(request.pixel, Time(50), [0.5; 3]);
-            Observation { pixel: request.pixel, now: Time(50), previous, change: 0.75 }
+            Observation { pixel: request.pixel, now: Time(50), previous, known: true, change: 0.75 }
         };
         let observations: Vec<Observation> = requests.iter().map(observe).collect();
-        sampler.observe(&observations);
+        sampler.observe(&canvas, &observations);
         let canvas = canvas.resized(other).resized(size);
         sampler.choose(Time(100), &canvas, 1, &mut requests);
         let known = sampler.known.as_ref().expect("made by the choice");
@@ -248,7 +248,7 @@ mod tests {
             let pixel = rng.below(size.pixels() as u32);
             let (now, change) = (Time(1000 + i), rng.unit_f32());
             let (previous, _) = canvas.replace(pixel, now, [0.0; 3]);
-            sums.update(&Observation { pixel, now, previous, change });
+            sums.update(&Observation { pixel, now, previous, known: true, change });
             d[pixel as usize] = f64::from(change);
         }
         // The formulas of the paper, pixel by pixel.

@@ -1,9 +1,11 @@
 //! The samplers, one file each.
 
+mod adaptive;
 mod change;
 mod permutation;
 mod random;
 
+pub use adaptive::Adaptive;
 pub use change::{Change, DEFAULT_TILE, DEFAULT_W_D};
 pub use permutation::Permutation;
 pub use random::Random;
@@ -24,6 +26,8 @@ pub enum SamplerKind {
         /// Side of a tile in pixels, at least 1.
         tile: u32,
     },
+    /// [`Adaptive`].
+    Adaptive,
 }
 
 impl SamplerKind {
@@ -31,8 +35,12 @@ impl SamplerKind {
     pub const CHANGE: SamplerKind = SamplerKind::Change { w_d: DEFAULT_W_D, tile: DEFAULT_TILE };
 
     /// Every kind with its default parameters.
-    pub const ALL: [SamplerKind; 3] =
-        [SamplerKind::Random, SamplerKind::Permutation, SamplerKind::CHANGE];
+    pub const ALL: [SamplerKind; 4] = [
+        SamplerKind::Random,
+        SamplerKind::Permutation,
+        SamplerKind::CHANGE,
+        SamplerKind::Adaptive,
+    ];
 
     /// The name used on the command line and in experiments.
     pub fn name(&self) -> &'static str {
@@ -40,6 +48,7 @@ impl SamplerKind {
             SamplerKind::Random => "random",
             SamplerKind::Permutation => "permutation",
             SamplerKind::Change { .. } => "change",
+            SamplerKind::Adaptive => "adaptive",
         }
     }
 
@@ -54,6 +63,7 @@ impl SamplerKind {
             SamplerKind::Random => Box::new(Random::new(seed)),
             SamplerKind::Permutation => Box::new(Permutation::new(seed)),
             SamplerKind::Change { w_d, tile } => Box::new(Change::new(w_d, tile, seed)),
+            SamplerKind::Adaptive => Box::new(Adaptive::new(seed)),
         }
     }
 }

@@ -1,0 +1,254 @@
+//! The picture from the carried samples.
+//!
+//! ```text
+//! e_j = v · age_j + s · dist_j²         expected squared error of sample j at a pixel's centre
+//! w_j = 1 / (e_j + ε)²                  over the samples of the reference's object
+//! ```
+//!
+//! The reference is the pixel's own sample with the least expected error, or, in a hole, the nearest one within five pixels.
+
+use super::store::{EMPTY, Store, Tick};
+use crate::rates::Rates;
+use crate::wide::{self, F8, M8};
+use crate::Time;
+
+/// Whether a pixel had a sample of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Hole {
+    No,
+    /// Neighbours know enough for a good guess.
+    Small,
+    /// Nothing near is known.
+    Large,
+}
+
+#[derive(Default)]
+pub(super) struct Gather {
+    holes: Vec<Hole>,
+    empty: Vec<u32>,
+}
+
+/// Below this expected error a sample is taken as it is.
+const EXACT: f32 = 2e-5;
+/// How far around a hole samples are looked for, in pixels.
+const REACH: u32 = 5;
+
+impl Gather {
+    /// Per pixel.
+    pub(super) fn holes(&self) -> &[Hole] {
+        &self.holes
+    }
+
+    /// `contrast` per tile of `rates`, whose tiles are eight pixels wide.
+    pub(super) fn run(
+        &mut self,
+        store: &Store,
+        now: Time,
+        rates: &Rates,
+        contrast: &[f32],
+        picture: &mut [[f32; 3]],
+    ) {
+        self.holes.clear();
+        self.holes.resize(picture.len(), Hole::No);
+        self.empty.clear();
+        let model = Model { store, now: Tick::of(now), rates, contrast };
+        wide::run(Blocks { model, picture, empty: &mut self.empty });
+        for &pixel in &self.empty {
+            let (rgb, hole) = model.fill(pixel, picture[pixel as usize]);
+            picture[pixel as usize] = rgb;
+            self.holes[pixel as usize] = hole;
+        }
+    }
+}
+
+/// The expected error of samples.
+#[derive(Clone, Copy)]
+struct Model<'a> {
+    store: &'a Store,
+    now: Tick,
+    rates: &'a Rates,
+    contrast: &'a [f32],
+}
+
+/// Pixels that have a sample of their own, eight at a time.
+struct Blocks<'a> {
+    model: Model<'a>,
+    picture: &'a mut [[f32; 3]],
+    empty: &'a mut Vec<u32>,
+}
+
+impl wide::Task for Blocks<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Blocks { model, picture, empty } = self;
+        let size = model.store.layout.size;
+        for y in 0..size.height {
+            for x in (0..size.width).step_by(8) {
+                let (rgb, objects) = model.block(x as i32, y as i32);
+                let first = size.index(x, y) as usize;
+                for lane in 0..8.min((size.width - x) as usize) {
+                    if objects.0[lane] == EMPTY {
+                        empty.push((first + lane) as u32);
+                    } else {
+                        picture[first + lane] = rgb.map(|plane| plane.0[lane]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Eight pixels in a row of one tile.
+struct Eight {
+    centre: [F8; 2],
+    /// The tile's learned rate of change, and its contrast.
+    v: F8,
+    s: F8,
+}
+
+impl Model<'_> {
+    /// Colours, and the objects that are seen.
+    #[inline(always)]
+    fn block(&self, x: i32, y: i32) -> ([F8; 3], M8) {
+        let layout = &self.store.layout;
+        let n = layout.per_side as i32;
+        let tile = self.rates.grid.tile_of(layout.size.index(x as u32, y as u32));
+        let mut centre_x = [0.0; 8];
+        for (lane, centre) in centre_x.iter_mut().enumerate() {
+            *centre = (x + lane as i32) as f32 + 0.5;
+        }
+        let eight = Eight {
+            centre: [F8(centre_x), F8::splat(y as f32 + 0.5)],
+            v: F8::splat(self.rates.of_tile(tile)),
+            s: F8::splat(self.contrast[tile]),
+        };
+        let mut least = F8::splat(f32::MAX);
+        let mut objects = M8([EMPTY; 8]);
+        let mut rgb = [F8::splat(0.0); 3];
+        for dy in 0..n {
+            for dx in 0..n {
+                let i = layout.neighbour(x, y, dx, dy);
+                let error = self.errors(i, &eight);
+                let object = M8::load(&self.store.object, i);
+                let better = error.less_than(least).and(object.equals(M8([EMPTY; 8])).not());
+                least = error.or(better, least);
+                objects = object.or(better, objects);
+                for (rgb, plane) in rgb.iter_mut().zip(&self.store.rgb) {
+                    *rgb = F8::load(plane, i).or(better, *rgb);
+                }
+            }
+        }
+        let exact = least.less_than(F8::splat(EXACT));
+        if exact.or(objects.equals(M8([EMPTY; 8])).not(), M8([u32::MAX; 8])).all() {
+            return (rgb, objects);
+        }
+        let mean = self.mean(x, y, &eight, objects);
+        (std::array::from_fn(|k| rgb[k].or(exact, mean[k])), objects)
+    }
+
+    #[inline(always)]
+    fn errors(&self, i: usize, eight: &Eight) -> F8 {
+        let dx = F8::load(&self.store.px[0], i) - eight.centre[0];
+        let dy = F8::load(&self.store.px[1], i) - eight.centre[1];
+        let ticks = M8::load(&self.store.tick, i);
+        let mut age_secs = [0.0; 8];
+        for lane in 0..8 {
+            age_secs[lane] = Tick(ticks.0[lane]).secs_until(self.now);
+        }
+        eight.v * F8(age_secs) + eight.s * (dx * dx + dy * dy)
+    }
+
+    /// Over the pixel's cells and those one further around.
+    #[inline(always)]
+    fn mean(&self, x: i32, y: i32, eight: &Eight, objects: M8) -> [F8; 3] {
+        let n = self.store.layout.per_side as i32;
+        let floor = F8::splat(least_error(eight.s.0[0]));
+        let zero = F8::splat(0.0);
+        let (mut red, mut green, mut blue, mut weights) = (zero, zero, zero, zero);
+        for dy in -1..=n {
+            for dx in -1..=n {
+                let i = self.store.layout.neighbour(x, y, dx, dy);
+                let error = self.errors(i, eight) + floor;
+                let same = M8::load(&self.store.object, i).equals(objects);
+                let weight = (F8::splat(1.0) / (error * error)).or(same, zero);
+                weights = weights + weight;
+                red = red + weight * F8::load(&self.store.rgb[0], i);
+                green = green + weight * F8::load(&self.store.rgb[1], i);
+                blue = blue + weight * F8::load(&self.store.rgb[2], i);
+            }
+        }
+        [red / weights, green / weights, blue / weights]
+    }
+
+    /// A pixel without a sample of its own, from what is known around it.
+    fn fill(&self, pixel: u32, before: [f32; 3]) -> ([f32; 3], Hole) {
+        let layout = &self.store.layout;
+        let (x, y) = layout.size.xy(pixel);
+        let n = layout.per_side as i32;
+        let mut nearest: Option<(usize, f32)> = None;
+        let mut count = 0;
+        for reach in 1..=(REACH * layout.per_side) as i32 {
+            self.ring(x as i32, y as i32, reach, true, |i| {
+                count += 1;
+                let distance2 = self.distance2(i, x, y);
+                if nearest.is_none_or(|(_, least)| distance2 < least) {
+                    nearest = Some((i, distance2));
+                }
+            });
+            if let Some((reference, _)) = nearest
+                && (count >= 2 || reach >= 3 * n)
+            {
+                let hole = if count < 4 || reach > n { Hole::Large } else { Hole::Small };
+                return (self.mean_around(pixel, reference, reach), hole);
+            }
+        }
+        (before, Hole::Large)
+    }
+
+    fn distance2(&self, i: usize, x: u32, y: u32) -> f32 {
+        let (dx, dy) = (self.store.px[0][i] - (x as f32 + 0.5), self.store.px[1][i] - (y as f32 + 0.5));
+        dx * dx + dy * dy
+    }
+
+    fn mean_around(&self, pixel: u32, reference: usize, reach: i32) -> [f32; 3] {
+        let (x, y) = self.store.layout.size.xy(pixel);
+        let tile = self.rates.grid.tile_of(pixel);
+        let (v, s) = (self.rates.of_tile(tile), self.contrast[tile]);
+        let (mut sum, mut weights) = ([0.0; 3], 0.0);
+        self.ring(x as i32, y as i32, reach, false, |i| {
+            if self.store.object[i] == self.store.object[reference] {
+                let age_secs = Tick(self.store.tick[i]).secs_until(self.now);
+                let error = v * age_secs + s * self.distance2(i, x, y) + least_error(s);
+                let weight = 1.0 / (error * error);
+                (0..3).for_each(|k| sum[k] += weight * self.store.rgb[k][i]);
+                weights += weight;
+            }
+        });
+        sum.map(|c| c / weights)
+    }
+
+    /// The samples within `reach` cells around a pixel, or those exactly so far.
+    fn ring(&self, x: i32, y: i32, reach: i32, border: bool, mut visit: impl FnMut(usize)) {
+        let layout = &self.store.layout;
+        let n = layout.per_side as i32;
+        let (columns, rows) = (layout.size.width as i32 * n, layout.size.height as i32 * n);
+        for cy in (y * n - reach).max(0)..((y + 1) * n + reach).min(rows) {
+            for cx in (x * n - reach).max(0)..((x + 1) * n + reach).min(columns) {
+                let far = cx == x * n - reach
+                    || cy == y * n - reach
+                    || cx + 1 == (x + 1) * n + reach
+                    || cy + 1 == (y + 1) * n + reach;
+                let i = layout.neighbour(0, 0, cx, cy);
+                if (far || !border) && !self.store.is_empty(i) {
+                    visit(i);
+                }
+            }
+        }
+    }
+}
+
+/// ε: so that a sample at the very centre does not weigh everything.
+#[inline(always)]
+fn least_error(s: f32) -> f32 {
+    1e-4 * s + 2e-6
+}

@@ -1,0 +1,96 @@
+//! Change as prediction error: a new sample against what the picture showed of its surface.
+//!
+//! The new hit is projected to where it was at the last refresh. For a surface at rest the error is the smaller of those against the
+//! nearest pixel and against the bilinear interpolation. For a moving one it is the distance to the range of the 3×3 colours
+//! there, plus a tenth of that: resampling a texture at other places is not change.
+
+use super::Reproject;
+use super::store::{SCREEN, Sample};
+
+/// What a sample found.
+pub(super) struct Found {
+    /// Σ over the channels of the squared difference.
+    pub(super) change: f32,
+    /// Whether the pixel's other samples show something that is no longer there.
+    pub(super) outdated: bool,
+}
+
+/// Per channel; where nothing can be compared, a quarter of the range is assumed to have changed.
+const UNKNOWN: f32 = 0.05;
+/// A surface that has moved less than this between two refreshes is at rest.
+const AT_REST_PX: f32 = 0.05;
+/// How much the raw difference of moving surfaces counts beside the distance to the range of colours.
+const RAW: f32 = 0.1;
+/// As in front propagation: mean squared difference per channel.
+const OUTDATED: f32 = 0.0025;
+
+impl Reproject {
+    pub(super) fn residual(&self, sample: &Sample, old: [f32; 3]) -> Found {
+        let rgb = sample.rgb;
+        if self.refreshes == 0 || sample.object == SCREEN {
+            let change = squared(rgb, old);
+            return Found { change, outdated: change > 3.0 * OUTDATED };
+        }
+        let size = self.store.layout.size;
+        let surface = sample.surface();
+        let then = self.poses[0].project(&surface).map(|there| there.px);
+        let inside = |px: &[f32; 2]| {
+            px[0] >= 0.0 && px[1] >= 0.0 && px[0] < size.width as f32 && px[1] < size.height as f32
+        };
+        let Some(px) = then.filter(inside) else {
+            return Found { change: UNKNOWN, outdated: true };
+        };
+        let raw = squared(rgb, self.nearest(px)).min(squared(rgb, self.bilinear(px)));
+        let outdated = raw > 3.0 * OUTDATED;
+        let moving = self.refreshes >= 2
+            && self.poses[1].project(&surface).is_some_and(|before| {
+                let [dx, dy] = [before.px[0] - px[0], before.px[1] - px[1]];
+                dx * dx + dy * dy > AT_REST_PX * AT_REST_PX
+            });
+        let change = if moving { self.beyond_range(px, rgb) + RAW * raw } else { raw };
+        Found { change, outdated }
+    }
+
+    fn at(&self, x: i32, y: i32) -> [f32; 3] {
+        let size = self.store.layout.size;
+        let x = x.clamp(0, size.width as i32 - 1) as u32;
+        let y = y.clamp(0, size.height as i32 - 1) as u32;
+        self.shown[size.index(x, y) as usize]
+    }
+
+    fn nearest(&self, px: [f32; 2]) -> [f32; 3] {
+        self.at(px[0] as i32, px[1] as i32)
+    }
+
+    fn bilinear(&self, px: [f32; 2]) -> [f32; 3] {
+        let (x, y) = (px[0] - 0.5, px[1] - 0.5);
+        let (x0, y0) = (x.floor(), y.floor());
+        let (u, v) = (x - x0, y - y0);
+        let (x0, y0) = (x0 as i32, y0 as i32);
+        let [a, b] = [self.at(x0, y0), self.at(x0 + 1, y0)];
+        let [c, d] = [self.at(x0, y0 + 1), self.at(x0 + 1, y0 + 1)];
+        std::array::from_fn(|k| {
+            (a[k] * (1.0 - u) + b[k] * u) * (1.0 - v) + (c[k] * (1.0 - u) + d[k] * u) * v
+        })
+    }
+
+    /// Squared distance to the range of the colours in the 3×3 pixels around.
+    fn beyond_range(&self, px: [f32; 2], rgb: [f32; 3]) -> f32 {
+        let (x, y) = (px[0] as i32, px[1] as i32);
+        let (mut low, mut high) = ([f32::MAX; 3], [f32::MIN; 3]);
+        for ny in y - 1..=y + 1 {
+            for nx in x - 1..=x + 1 {
+                let c = self.at(nx, ny);
+                for k in 0..3 {
+                    low[k] = low[k].min(c[k]);
+                    high[k] = high[k].max(c[k]);
+                }
+            }
+        }
+        (0..3).map(|k| (low[k] - rgb[k]).max(rgb[k] - high[k]).max(0.0).powi(2)).sum()
+    }
+}
+
+fn squared(a: [f32; 3], b: [f32; 3]) -> f32 {
+    (0..3).map(|k| (a[k] - b[k]).powi(2)).sum()
+}

@@ -1,0 +1,227 @@
+//! The samples kept: at most one in every cell of the picture.
+//!
+//! Stored plane by plane, so that eight pixels at a time can be worked on. With n×n cells per pixel there are n² sub-grids, each with
+//! one cell of every pixel, one after the other; every sub-grid has a border of one empty cell, so that loops over neighbours
+//! need no bounds.
+
+use crate::{Display, Kept, Size, Surface, Time};
+
+/// The object number of samples of which the renderer could not say what they hit: they stay where they are in the picture.
+pub(super) const SCREEN: u32 = Surface::SKY - 1;
+/// The object number of an empty cell.
+pub(super) const EMPTY: u32 = Surface::SKY - 2;
+
+/// A point on an object, as in [`Surface`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+pub(super) struct Anchor {
+    pub(super) position: [f32; 3],
+    pub(super) primitive: u32,
+}
+
+/// One sample.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sample {
+    /// Display-referred sRGB.
+    pub(super) rgb: [f32; 3],
+    /// Where in the picture, in pixels.
+    pub(super) px: [f32; 2],
+    pub(super) depth: f32,
+    pub(super) tick: Tick,
+    pub(super) object: u32,
+    pub(super) anchor: Anchor,
+}
+
+/// A time in units of 2¹⁴ ns (16 µs), modulo 2³² of them (19 hours).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Tick(pub(super) u32);
+
+const TICK_BITS: u32 = 14;
+const TICK_SECS: f32 = (1u64 << TICK_BITS) as f32 * 1e-9;
+
+impl Tick {
+    pub(super) fn of(time: Time) -> Tick {
+        Tick((time.0 >> TICK_BITS) as u32)
+    }
+
+    #[inline(always)]
+    pub(super) fn secs_until(self, now: Tick) -> f32 {
+        now.0.wrapping_sub(self.0) as i32 as f32 * TICK_SECS
+    }
+
+    /// The time, rounded down, of a tick that is not later than `now`.
+    pub(super) fn time(self, now: Time) -> Time {
+        let ago = u64::from(Tick::of(now).0.wrapping_sub(self.0));
+        Time(((now.0 >> TICK_BITS) - ago) << TICK_BITS)
+    }
+
+    fn is_later_than(self, other: Tick) -> bool {
+        self.0.wrapping_sub(other.0) as i32 > 0
+    }
+}
+
+impl Sample {
+    pub(super) fn new(kept: &Kept<'_>, i: usize, display: &Display) -> Sample {
+        let (object, anchor) = match kept.surfaces.get(i) {
+            Some(s) => (s.object, Anchor { position: s.position, primitive: s.primitive }),
+            None => (SCREEN, Anchor::default()),
+        };
+        Sample {
+            rgb: display.encode(kept.new[i]),
+            px: kept.requests[i].position_px(kept.size),
+            depth: f32::INFINITY,
+            tick: Tick::of(kept.now),
+            object,
+            anchor,
+        }
+    }
+
+    pub(super) fn surface(&self) -> Surface {
+        surface(self.object, &self.anchor)
+    }
+}
+
+pub(super) fn surface(object: u32, anchor: &Anchor) -> Surface {
+    let Anchor { position, primitive } = *anchor;
+    Surface { object, primitive, position, normal: [0.0; 3], albedo: [0.0; 3], lit: 0 }
+}
+
+/// How the cells lie in memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Layout {
+    pub(super) size: Size,
+    /// Cells per pixel side.
+    pub(super) per_side: u32,
+    /// From a cell to the one below it in its sub-grid.
+    pub(super) stride: usize,
+    /// Cells of a sub-grid, its border included.
+    pub(super) plane: usize,
+}
+
+impl Layout {
+    pub(super) fn new(size: Size, per_side: u32) -> Layout {
+        // Rows end with room for a whole block of eight.
+        let stride = (size.width as usize).next_multiple_of(8) + 8;
+        Layout { size, per_side, stride, plane: stride * (size.height as usize + 2) }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.plane * (self.per_side * self.per_side) as usize
+    }
+
+    /// Where the first sub-grid's cell of pixel (x, y) is; −1 and the width or height lie in the border.
+    #[inline(always)]
+    pub(super) fn of_pixel(&self, x: i32, y: i32) -> usize {
+        (y + 1) as usize * self.stride + (x + 1) as usize
+    }
+
+    /// The cell at a position in the picture, in pixels; `None` outside.
+    #[inline(always)]
+    pub(super) fn of_px(&self, px: [f32; 2]) -> Option<usize> {
+        let [x, y] = px;
+        let inside =
+            x >= 0.0 && y >= 0.0 && x < self.size.width as f32 && y < self.size.height as f32;
+        if !inside {
+            return None;
+        }
+        let (column, row) = (x as i32, y as i32);
+        let first = self.of_pixel(column, row);
+        if self.per_side == 1 {
+            return Some(first);
+        }
+        let n = self.per_side as f32;
+        let sub = |p: f32, whole: i32| (((p - whole as f32) * n) as usize).min(self.per_side as usize - 1);
+        Some(first + self.plane * (sub(y, row) * self.per_side as usize + sub(x, column)))
+    }
+
+    /// The cell `dx`, `dy` cells from the first cell of pixel (x, y).
+    #[inline(always)]
+    pub(super) fn neighbour(&self, x: i32, y: i32, dx: i32, dy: i32) -> usize {
+        let n = self.per_side as i32;
+        if n == 1 {
+            return self.of_pixel(x + dx, y + dy);
+        }
+        let (cx, cy) = (x * n + dx, y * n + dy);
+        let (x, y) = (cx.div_euclid(n), cy.div_euclid(n));
+        let sub = (cy - y * n) * n + (cx - x * n);
+        self.of_pixel(x, y) + self.plane * sub as usize
+    }
+}
+
+/// A grid of cells, plane by plane.
+pub(super) struct Store {
+    pub(super) layout: Layout,
+    pub(super) rgb: [Vec<f32>; 3],
+    pub(super) px: [Vec<f32>; 2],
+    pub(super) depth: Vec<f32>,
+    pub(super) tick: Vec<u32>,
+    pub(super) object: Vec<u32>,
+    pub(super) anchor: Vec<Anchor>,
+}
+
+impl Store {
+    pub(super) fn new(size: Size, per_side: u32) -> Store {
+        let layout = Layout::new(size, per_side);
+        let plane = || vec![0.0; layout.len()];
+        Store {
+            rgb: std::array::from_fn(|_| plane()),
+            px: std::array::from_fn(|_| plane()),
+            depth: plane(),
+            tick: vec![0; layout.len()],
+            object: vec![EMPTY; layout.len()],
+            anchor: vec![Anchor::default(); layout.len()],
+            layout,
+        }
+    }
+
+    pub(super) fn get(&self, i: usize) -> Sample {
+        Sample {
+            rgb: std::array::from_fn(|k| self.rgb[k][i]),
+            px: [self.px[0][i], self.px[1][i]],
+            depth: self.depth[i],
+            tick: Tick(self.tick[i]),
+            object: self.object[i],
+            anchor: self.anchor[i],
+        }
+    }
+
+    pub(super) fn set(&mut self, i: usize, sample: &Sample) {
+        (0..3).for_each(|k| self.rgb[k][i] = sample.rgb[k]);
+        [self.px[0][i], self.px[1][i]] = sample.px;
+        self.depth[i] = sample.depth;
+        self.tick[i] = sample.tick.0;
+        self.object[i] = sample.object;
+        self.anchor[i] = sample.anchor;
+    }
+
+    #[inline(always)]
+    pub(super) fn is_empty(&self, i: usize) -> bool {
+        self.object[i] == EMPTY
+    }
+
+    /// The cell of the newest sample in a pixel.
+    #[inline(always)]
+    pub(super) fn newest(&self, x: u32, y: u32) -> Option<usize> {
+        let first = self.layout.of_pixel(x as i32, y as i32);
+        let mut newest = None;
+        for sub in 0..(self.layout.per_side * self.layout.per_side) as usize {
+            let i = first + sub * self.layout.plane;
+            let later = |other: usize| Tick(self.tick[i]).is_later_than(Tick(self.tick[other]));
+            if !self.is_empty(i) && newest.is_none_or(later) {
+                newest = Some(i);
+            }
+        }
+        newest
+    }
+
+    /// Puts a sample into its cell. `outdated`: the pixel's others show something that is no longer there.
+    pub(super) fn insert(&mut self, sample: &Sample, outdated: bool) {
+        let Some(i) = self.layout.of_px(sample.px) else { return };
+        let subs = (self.layout.per_side * self.layout.per_side) as usize;
+        if outdated && subs > 1 {
+            let first = i % self.layout.plane;
+            (0..subs).for_each(|sub| self.object[first + sub * self.layout.plane] = EMPTY);
+        }
+        self.set(i, sample);
+    }
+}

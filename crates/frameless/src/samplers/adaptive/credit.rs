@@ -1,0 +1,92 @@
+//! The even share of the tiles: a deterministic draw by credit, and Bayer's order inside a tile.
+//!
+//! ```text
+//! c_i ← c_i + n · ((1 − ε) √v_i / Σ√v + ε / N)        for every tile i of N, n samples to be given out
+//! while c_i ≥ 1:  c_i ← c_i − 1, draw tile i
+//! ```
+//!
+//! The square root is the optimum for jump-like change: a pixel traced f times a second with an error that grows like v · age is
+//! off by v / 2f on average, and Σ v_i / f_i at given Σ f_i is least for f_i ∝ √v_i.
+
+use crate::bayer;
+use crate::rates::Rates;
+use crate::{Canvas, Rng, Time};
+
+/// ε: the part of the samples that is spread evenly over the picture, so that every pixel has a floor frequency.
+const EVENLY: f32 = 0.2;
+/// Added to v: so that a picture at rest is refined evenly.
+const LEAST_RATE: f32 = 1e-7;
+/// Pixels looked at before one is taken that is younger than half the mean age of its tile.
+const TRIES: u32 = 4;
+
+/// Credits and places in the order, per tile.
+pub(crate) struct Credit {
+    credit: Vec<f32>,
+    place: Vec<u32>,
+    weight: Vec<f32>,
+    /// Pixels of a tile in their order, relative to its corner.
+    order: Vec<(u32, u32)>,
+}
+
+impl Credit {
+    pub(crate) fn new(tiles: usize, side_bits: u32, rng: &mut Rng) -> Credit {
+        Credit {
+            credit: (0..tiles).map(|_| rng.unit_f32()).collect(),
+            place: (0..tiles).map(|_| rng.next_u32()).collect(),
+            weight: vec![0.0; tiles],
+            order: bayer::order(side_bits),
+        }
+    }
+
+    /// Gives out about `count` samples; exactly on average.
+    pub(crate) fn draw(
+        &mut self,
+        now: Time,
+        canvas: &Canvas,
+        rates: &Rates,
+        count: f32,
+        mut take: impl FnMut(u32),
+    ) {
+        let tiles = self.credit.len();
+        let mut sum = 0.0;
+        for (weight, rate) in self.weight.iter_mut().zip(rates.all()) {
+            *weight = (rate + LEAST_RATE).sqrt();
+            sum += *weight;
+        }
+        let (per_weight, evenly) = ((1.0 - EVENLY) * count / sum, EVENLY * count / tiles as f32);
+        for tile in 0..tiles {
+            self.credit[tile] += per_weight * self.weight[tile] + evenly;
+            while self.credit[tile] >= 1.0 {
+                self.credit[tile] -= 1.0;
+                take(self.pixel(now, canvas, rates, tile));
+            }
+        }
+    }
+
+    fn pixel(&mut self, now: Time, canvas: &Canvas, rates: &Rates, tile: usize) -> u32 {
+        let rect = rates.grid.rect(tile);
+        let (mut oldest, mut oldest_secs) = (canvas.size().index(rect.x0, rect.y0), -1.0);
+        let enough_secs = 0.5 * rates.mean_age_secs(tile);
+        let mut tries = 0;
+        while tries < TRIES {
+            let (dx, dy) = self.order[self.place[tile] as usize % self.order.len()];
+            self.place[tile] = self.place[tile].wrapping_add(1);
+            let (x, y) = (rect.x0 + dx, rect.y0 + dy);
+            if x >= rect.x1 || y >= rect.y1 {
+                continue;
+            }
+            tries += 1;
+            let pixel = canvas.size().index(x, y);
+            let i = pixel as usize;
+            let age_secs =
+                if canvas.known()[i] { now.secs_since(canvas.time()[i]) as f32 } else { f32::MAX };
+            if age_secs > oldest_secs {
+                (oldest, oldest_secs) = (pixel, age_secs);
+            }
+            if age_secs > enough_secs {
+                break;
+            }
+        }
+        oldest
+    }
+}

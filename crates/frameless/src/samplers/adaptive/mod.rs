@@ -1,0 +1,166 @@
+//! Sampler `adaptive`: holes first, then moving fronts, then tiles by the square root of their learned rate of change.
+//!
+//! A batch is filled in this order:
+//!
+//! 1. **Holes** ([`Canvas::holes`]), at most 40 %: pixels of which nothing is known.
+//! 2. **Fronts** ([`front`]), at most 60 % of the rest: neighbours of samples that found a change. Gated off where most of
+//!    the picture changes, since there is nothing to follow then.
+//! 3. **Tiles** ([`credit`]): by √v, with an even share for all.
+
+mod credit;
+mod front;
+
+use crate::rates::Rates;
+use crate::tile::TileGrid;
+use crate::{Canvas, Insight, Observation, Request, Rng, Sampler, Time};
+use credit::Credit;
+use front::Front;
+
+/// Side of a tile, as a power of two: 8 pixels.
+const TILE_BITS: u32 = 3;
+/// The largest part of a batch that holes get.
+const HOLE_SHARE: f32 = 0.4;
+/// The largest part of what holes leave that fronts get.
+const FRONT_SHARE: f32 = 0.6;
+/// A tile whose v is above this is hot: fronts are everywhere in it.
+const HOT_RATE: f32 = 0.01;
+/// Where this part of the tiles is hot fronts begin to lose their share; at twice as many they have none.
+const HOT_PART: f32 = 0.2;
+
+/// See the module.
+pub struct Adaptive {
+    rng: Rng,
+    state: Option<State>,
+}
+
+/// What is known of one canvas.
+struct State {
+    generation: u32,
+    rates: Rates,
+    credit: Credit,
+    front: Front,
+    front_share: f32,
+    holes_found: u64,
+    next_hole: usize,
+    /// Samples given out too few.
+    owed: f32,
+    /// Why each pixel was asked for last.
+    why: Vec<Why>,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Why {
+    Tile,
+    Front,
+    Hole,
+}
+
+impl Adaptive {
+    /// The same seed makes the same choices.
+    pub fn new(seed: u64) -> Adaptive {
+        Adaptive { rng: Rng::new(seed), state: None }
+    }
+}
+
+impl State {
+    fn new(canvas: &Canvas, rng: &mut Rng) -> State {
+        let grid = TileGrid::new(canvas.size(), 1 << TILE_BITS);
+        State {
+            generation: canvas.generation(),
+            credit: Credit::new(grid.len(), TILE_BITS, rng),
+            rates: Rates::new(grid),
+            front: Front::new(canvas.size()),
+            front_share: FRONT_SHARE,
+            holes_found: 0,
+            next_hole: 0,
+            owed: 0.0,
+            why: vec![Why::Tile; canvas.size().pixels()],
+        }
+    }
+
+    fn take(&mut self, pixel: u32, why: Why, requests: &mut Vec<Request>) {
+        self.why[pixel as usize] = why;
+        requests.push(Request::centre(pixel));
+    }
+
+    fn choose_holes(&mut self, canvas: &Canvas, most: usize, requests: &mut Vec<Request>) {
+        if self.holes_found != canvas.holes_found() {
+            self.holes_found = canvas.holes_found();
+            self.next_hole = 0;
+        }
+        let end = requests.len() + most;
+        while requests.len() < end {
+            let Some(&pixel) = canvas.holes().get(self.next_hole) else { return };
+            self.next_hole += 1;
+            if !canvas.known()[pixel as usize] {
+                self.take(pixel, Why::Hole, requests);
+            }
+        }
+    }
+
+    fn choose_fronts(&mut self, canvas: &Canvas, rest: usize, requests: &mut Vec<Request>) {
+        let hot = self.rates.all().iter().filter(|&&rate| rate > HOT_RATE).count();
+        let hot_part = hot as f32 / self.rates.all().len() as f32;
+        self.front_share = FRONT_SHARE * (2.0 - hot_part / HOT_PART).clamp(0.0, 1.0);
+        if self.front_share == 0.0 {
+            self.front.clear();
+            return;
+        }
+        let end = requests.len() + (self.front_share * rest as f32) as usize;
+        while requests.len() < end {
+            let Some(pixel) = self.front.next(canvas) else { return };
+            self.take(pixel, Why::Front, requests);
+        }
+    }
+}
+
+impl Sampler for Adaptive {
+    fn choose(&mut self, now: Time, canvas: &Canvas, count: usize, requests: &mut Vec<Request>) {
+        if self.state.as_ref().is_some_and(|state| state.generation != canvas.generation()) {
+            self.state = None;
+        }
+        let state = self.state.get_or_insert_with(|| State::new(canvas, &mut self.rng));
+        let start = requests.len();
+        state.choose_holes(canvas, (HOLE_SHARE * count as f32) as usize, requests);
+        state.choose_fronts(canvas, count - (requests.len() - start), requests);
+        let rest = (count - (requests.len() - start)) as f32;
+        let before = requests.len();
+        let State { credit, rates, why, owed, .. } = state;
+        credit.draw(now, canvas, rates, rest + *owed, |pixel| {
+            why[pixel as usize] = Why::Tile;
+            requests.push(Request::centre(pixel));
+        });
+        *owed += rest - (requests.len() - before) as f32;
+    }
+
+    fn observe(&mut self, canvas: &Canvas, observations: &[Observation]) {
+        let Some(state) = self.state.as_mut().filter(|s| s.generation == canvas.generation()) else {
+            return;
+        };
+        for observed in observations {
+            let why = state.why[observed.pixel as usize];
+            if !observed.known || why == Why::Hole {
+                continue;
+            }
+            let tile = state.rates.grid.tile_of(observed.pixel);
+            let weight = if why == Why::Front { 0.5 } else { 1.0 };
+            state.rates.observe(tile, observed, weight);
+            if state.front_share > 0.0 {
+                state.front.observe(observed, canvas);
+            }
+        }
+    }
+
+    fn rates(&self) -> Option<&Rates> {
+        self.state.as_ref().map(|state| &state.rates)
+    }
+
+    fn inspect(&self, _now: Time, canvas: &Canvas) -> Insight {
+        let Some(state) = &self.state else { return Insight::default() };
+        let pixels = 0..canvas.size().pixels() as u32;
+        Insight {
+            change: pixels.map(|p| state.rates.of_pixel(p)).collect(),
+            ..Insight::default()
+        }
+    }
+}

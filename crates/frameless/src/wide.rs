@@ -1,0 +1,135 @@
+//! Loops over plain numbers, compiled for the vector unit of the processor at hand. The one place of this crate with `unsafe` code.
+//!
+//! The results do not depend on it: every lane does the same IEEE operations, and nothing is contracted.
+#![allow(unsafe_code)]
+
+/// A loop to be compiled twice.
+pub(crate) trait Task {
+    /// Must be `inline(always)`, and so must what its inner loop calls.
+    fn run(self);
+}
+
+/// Runs `task`, with AVX2 where the processor has it.
+pub(crate) fn run(task: impl Task) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        #[target_feature(enable = "avx2")]
+        fn run_avx2(task: impl Task) {
+            task.run()
+        }
+        // SAFETY: the processor has just been asked.
+        return unsafe { run_avx2(task) };
+    }
+    task.run()
+}
+
+/// Eight numbers at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct F8(pub(crate) [f32; 8]);
+
+impl F8 {
+    #[inline(always)]
+    pub(crate) fn splat(x: f32) -> F8 {
+        F8([x; 8])
+    }
+
+    /// The eight from `start` on.
+    #[inline(always)]
+    pub(crate) fn load(plane: &[f32], start: usize) -> F8 {
+        F8(plane[start..start + 8].try_into().expect("eight"))
+    }
+
+    #[inline(always)]
+    fn with(self, other: F8, f: impl Fn(f32, f32) -> f32) -> F8 {
+        let mut result = [0.0; 8];
+        for lane in 0..8 {
+            result[lane] = f(self.0[lane], other.0[lane]);
+        }
+        F8(result)
+    }
+
+    /// `self` where the mask is set, `other` elsewhere.
+    #[inline(always)]
+    pub(crate) fn or(self, mask: M8, other: F8) -> F8 {
+        let mut result = [0.0; 8];
+        for lane in 0..8 {
+            let (a, b) = (self.0[lane].to_bits(), other.0[lane].to_bits());
+            result[lane] = f32::from_bits((a & mask.0[lane]) | (b & !mask.0[lane]));
+        }
+        F8(result)
+    }
+
+    #[inline(always)]
+    pub(crate) fn less_than(self, other: F8) -> M8 {
+        let mut mask = [0; 8];
+        for lane in 0..8 {
+            mask[lane] = u32::from(self.0[lane] < other.0[lane]).wrapping_neg();
+        }
+        M8(mask)
+    }
+}
+
+macro_rules! lane_by_lane {
+    ($($trait:ident $method:ident $op:tt),*) => {$(
+        impl std::ops::$trait for F8 {
+            type Output = F8;
+            #[inline(always)]
+            fn $method(self, other: F8) -> F8 {
+                self.with(other, |a, b| a $op b)
+            }
+        }
+    )*};
+}
+lane_by_lane!(Add add +, Sub sub -, Mul mul *, Div div /);
+
+/// Eight whole numbers at a time; as a mask, all bits of a lane are set or none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct M8(pub(crate) [u32; 8]);
+
+impl M8 {
+    /// The eight from `start` on.
+    #[inline(always)]
+    pub(crate) fn load(plane: &[u32], start: usize) -> M8 {
+        M8(plane[start..start + 8].try_into().expect("eight"))
+    }
+
+    #[inline(always)]
+    fn with(self, other: M8, f: impl Fn(u32, u32) -> u32) -> M8 {
+        let mut result = [0; 8];
+        for lane in 0..8 {
+            result[lane] = f(self.0[lane], other.0[lane]);
+        }
+        M8(result)
+    }
+
+    #[inline(always)]
+    pub(crate) fn equals(self, other: M8) -> M8 {
+        self.with(other, |a, b| u32::from(a == b).wrapping_neg())
+    }
+
+    #[inline(always)]
+    pub(crate) fn and(self, other: M8) -> M8 {
+        self.with(other, |a, b| a & b)
+    }
+
+    #[inline(always)]
+    pub(crate) fn not(self) -> M8 {
+        self.with(self, |a, _| !a)
+    }
+
+    /// `self` where the mask is set, `other` elsewhere.
+    #[inline(always)]
+    pub(crate) fn or(self, mask: M8, other: M8) -> M8 {
+        let mut result = [0; 8];
+        for lane in 0..8 {
+            result[lane] = (self.0[lane] & mask.0[lane]) | (other.0[lane] & !mask.0[lane]);
+        }
+        M8(result)
+    }
+
+    /// Whether all lanes of a mask are set.
+    #[inline(always)]
+    pub(crate) fn all(self) -> bool {
+        self.0.iter().fold(u32::MAX, |all, lane| all & lane) == u32::MAX
+    }
+}
