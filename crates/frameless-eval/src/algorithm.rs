@@ -78,6 +78,17 @@ impl Algorithm {
         }
     }
 
+    /// Whether the seed makes a difference; one seed is enough for those where it makes none.
+    pub fn is_seeded(&self) -> bool {
+        match self {
+            Algorithm::Frameless(_) | Algorithm::Progressive => true,
+            Algorithm::Framed
+            | Algorithm::FramedSingle
+            | Algorithm::LowRes { .. }
+            | Algorithm::OracleHold => false,
+        }
+    }
+
     /// The algorithm at work, at time 0.
     pub(crate) fn contender<'a>(&self, arena: Arena<'a>) -> Box<dyn Contender + 'a> {
         match *self {

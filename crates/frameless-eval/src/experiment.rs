@@ -21,6 +21,11 @@
 //! stills_secs = [1.0]     # which instants are shown as pictures
 //! show = ["random", "change", "ideal"]   # side by side, in stills and video; default: everything
 //! video = true            # default
+//!
+//! [equal_quality]         # how many times more samples/s does each opponent need for the same mean RMSE? default: not asked
+//! algorithms = ["change"]             # whose quality is to be reached; all of them among the algorithms above
+//! opponents = ["random"]              # who needs more; likewise
+//! max_factor = 64                     # default: the opponent's rate is scanned up to so many times the algorithm's
 //! ```
 //!
 //! Unknown keys are refused.
@@ -62,6 +67,19 @@ pub struct Experiment {
     pub show: Vec<String>,
     /// Whether videos are made.
     pub video: bool,
+    /// Who is compared at equal quality; `None` if nobody.
+    pub equal_quality: Option<EqualQualitySpec>,
+}
+
+/// How many times more samples per second does each opponent need for the mean RMSE of each algorithm?
+#[derive(Clone, Debug, PartialEq)]
+pub struct EqualQualitySpec {
+    /// Whose quality is to be reached: some of [`Experiment::algorithms`], at least one.
+    pub algorithms: Vec<Algorithm>,
+    /// Who needs more: some of [`Experiment::algorithms`], at least one.
+    pub opponents: Vec<Algorithm>,
+    /// The opponent's rate is scanned up to so many times the algorithm's; more than 1.
+    pub max_factor: f64,
 }
 
 /// A scene of an experiment.
@@ -106,6 +124,7 @@ struct ExperimentFile {
     scenes: Vec<SceneTable>,
     #[serde(default)]
     output: OutputTable,
+    equal_quality: Option<EqualQualityTable>,
 }
 
 #[derive(Deserialize)]
@@ -126,6 +145,18 @@ struct OutputTable {
     video: Option<bool>,
 }
 
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EqualQualityTable {
+    algorithms: Vec<String>,
+    opponents: Vec<String>,
+    #[serde(default = "default_max_factor")]
+    max_factor: f64,
+}
+
+fn default_max_factor() -> f64 {
+    64.0
+}
 fn default_algorithms() -> Vec<String> {
     ["random", "permutation", "change"].map(String::from).to_vec()
 }
@@ -161,6 +192,8 @@ const LONGEST_RUN_REFRESHES: f64 = 100_000.0;
 const BYTES_PER_PIXEL: f64 = 13.0;
 // A hundred times the sketch's rate; a second of more would take minutes to simulate.
 const MOST_SAMPLES_PER_SEC: f64 = 1e8;
+// Nobody waits for more.
+const LARGEST_FACTOR: f64 = 4096.0;
 const MOST_BYTES: f64 = 8.0 * (1u64 << 30) as f64;
 
 impl Experiment {
@@ -261,6 +294,8 @@ fn check(file: ExperimentFile, folder: &Path) -> Result<Experiment, String> {
         Err(format!("stills_secs: {secs} is not within the run of {} s", file.duration_secs))
     });
     let stills = stills.collect::<Result<_, _>>()?;
+    let equal_quality = file.equal_quality.map(|table| checked_equal_quality(table, &algorithms));
+    let equal_quality = equal_quality.transpose()?;
     let show = checked_show(file.output.show, &algorithms)?;
     let size = Size::new(file.width, file.height);
     let video = file.output.video.unwrap_or(true);
@@ -280,6 +315,7 @@ fn check(file: ExperimentFile, folder: &Path) -> Result<Experiment, String> {
         stills,
         show,
         video,
+        equal_quality,
     })
 }
 
@@ -331,4 +367,34 @@ fn checked_show(show: Vec<String>, algorithms: &[Algorithm]) -> Result<Vec<Strin
         return Err(format!("show: {stranger:?} is not among {}", known.join(", ")));
     }
     Ok(if show.is_empty() { known } else { show })
+}
+
+fn checked_equal_quality(
+    table: EqualQualityTable,
+    known: &[Algorithm],
+) -> Result<EqualQualitySpec, String> {
+    if !(table.max_factor > 1.0 && table.max_factor <= LARGEST_FACTOR) {
+        return Err(format!(
+            "equal_quality.max_factor must be more than 1 and at most {LARGEST_FACTOR}, got {}",
+            table.max_factor
+        ));
+    }
+    let among = |key: &str, names: Vec<String>| -> Result<Vec<Algorithm>, String> {
+        if names.is_empty() {
+            return Err(format!("equal_quality.{key} is empty: at least one is needed"));
+        }
+        let find = |name: &String| {
+            let algorithm = Algorithm::from_name(name)?;
+            let is_known = known.contains(&algorithm);
+            is_known
+                .then_some(algorithm)
+                .ok_or_else(|| format!("equal_quality.{key}: {name:?} is not among the algorithms"))
+        };
+        names.iter().map(find).collect()
+    };
+    Ok(EqualQualitySpec {
+        algorithms: among("algorithms", table.algorithms)?,
+        opponents: among("opponents", table.opponents)?,
+        max_factor: table.max_factor,
+    })
 }

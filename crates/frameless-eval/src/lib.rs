@@ -19,11 +19,11 @@ mod subject;
 
 pub use algorithm::Algorithm;
 pub use camera_path::CameraPath;
-pub use experiment::{Experiment, IDEAL, SceneSource, SceneSpec};
+pub use experiment::{EqualQualitySpec, Experiment, IDEAL, SceneSource, SceneSpec};
 
 pub use subject::{Subject, SubjectTracer};
 
-pub use contender::{Arena, Contender};
+pub use contender::{Arena, Contender, Shown};
 pub use ideal::{Ideals, refresh_time};
 pub use run::{Cell, run};
 

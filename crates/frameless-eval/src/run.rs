@@ -1,7 +1,7 @@
 //! One run: one scene, one algorithm, one rate, one seed, against the ideal at every refresh.
 
 use crate::algorithm::Algorithm;
-use crate::contender::Arena;
+use crate::contender::{Arena, Shown};
 use crate::error::EvalError;
 use crate::experiment::Experiment;
 use crate::ideal::{Ideals, refresh_time};
@@ -41,13 +41,13 @@ pub fn run(
         samples_per_sec: cell.samples_per_sec,
         seed: cell.seed,
     });
-    let mut picture = Picture::new();
+    let mut shown = Shown::default();
     let (mut whole, mut changed) = (Vec::new(), Vec::new());
     for (k, ideal) in ideals.pictures.iter().enumerate() {
-        contender.show(refresh_time(k, experiment.display_hz), &mut picture)?;
-        whole.push(rmse(&picture, ideal));
-        changed.push(rmse_where(&ideals.changed[k], &picture, ideal));
-        if !look(k, &picture) {
+        contender.show(refresh_time(k, experiment.display_hz), &mut shown)?;
+        whole.push(rmse(&shown.picture, ideal));
+        changed.push(rmse_where(&ideals.changed[k], &shown.picture, ideal));
+        if !look(k, &shown.picture) {
             return Err(EvalError::Interrupted);
         }
     }

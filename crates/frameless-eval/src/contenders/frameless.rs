@@ -2,8 +2,7 @@
 
 use frameless::{Canvas, Clock, Engine, EngineError, Sampler, Time};
 
-use crate::contender::{Arena, Contender};
-use crate::metrics::Picture;
+use crate::contender::{Arena, Contender, Shown};
 use crate::subject::SubjectTracer;
 
 /// The product itself, on the simulated clock.
@@ -22,11 +21,13 @@ impl<'a> Frameless<'a> {
 }
 
 impl Contender for Frameless<'_> {
-    fn show(&mut self, time: Time, picture: &mut Picture) -> Result<(), EngineError> {
+    fn show(&mut self, time: Time, shown: &mut Shown) -> Result<(), EngineError> {
         self.engine.run_until(time)?;
-        let (rgb, display) = (self.engine.canvas().rgb(), self.engine.display());
-        picture.clear();
-        picture.extend(rgb.iter().map(|&rgb| display.encode(rgb)));
+        let (canvas, display) = (self.engine.canvas(), self.engine.display());
+        shown.picture.clear();
+        shown.picture.extend(canvas.rgb().iter().map(|&rgb| display.encode(rgb)));
+        shown.age_secs.clear();
+        shown.age_secs.extend(canvas.time().iter().map(|&traced| time.secs_since(traced) as f32));
         Ok(())
     }
 }
