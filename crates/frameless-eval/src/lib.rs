@@ -27,7 +27,7 @@ pub use contender::{Arena, Contender, Shown};
 pub use ideal::{Ideals, refresh_time};
 pub use run::{Cell, run};
 
-pub use metrics::{Picture, changed_region, mean, quantile, rmse, rmse_where};
+pub use metrics::{Picture, changed_region, flip, mean, psnr_db, quantile, rmse, rmse_where, ssim};
 pub use results::{
     AtRest, Bound, Curve, EqualQuality, EventResult, RESULTS_VERSION, Results, RunResult,
 };
