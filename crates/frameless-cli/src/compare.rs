@@ -57,24 +57,24 @@ impl Bar {
         let stop = Arc::clone(&interrupted);
         ctrlc::set_handler(move || stop.store(true, Ordering::Relaxed))
             .context("cannot listen for Ctrl-C")?;
-        Ok(Bar { bar: ProgressBar::new(0), interrupted })
+        let bar = ProgressBar::new(0);
+        let style = ProgressStyle::with_template("{bar:30} {percent:>3} %, {eta} left · {msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        Ok(Bar { bar, interrupted })
     }
 }
 
 impl Progress for Bar {
-    fn begin(&self, pictures: u64) {
-        let style =
-            ProgressStyle::with_template("{bar:30} {pos}/{len} pictures, {eta} left · {msg}");
-        self.bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        self.bar.set_length(pictures);
+    fn plan(&self, work: u64) {
+        self.bar.set_length(work);
     }
 
     fn stage(&self, what: &str) {
         self.bar.set_message(what.to_owned());
     }
 
-    fn advance(&self) {
-        self.bar.inc(1);
+    fn advance(&self, work: u64) {
+        self.bar.inc(work);
     }
 
     fn should_stop(&self) -> bool {

@@ -48,9 +48,22 @@ pub enum EvalError {
     /// The renderer's answer could not be used.
     #[error(transparent)]
     Engine(#[from] EngineError),
-    /// The user has asked to stop.
-    #[error("interrupted: nothing was written")]
+    /// The user has asked to stop, within a run.
+    #[error("interrupted")]
     Interrupted,
+    /// The user has asked to stop; what was finished is kept.
+    #[error(
+        "interrupted: {kept} of {wanted} runs are finished and kept in {}; the same command again goes on from there",
+        out.display()
+    )]
+    Unfinished {
+        /// Runs that need not be made again.
+        kept: usize,
+        /// Runs of the experiment.
+        wanted: usize,
+        /// The output folder.
+        out: PathBuf,
+    },
 }
 
 impl EvalError {

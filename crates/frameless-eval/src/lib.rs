@@ -15,6 +15,7 @@ mod metrics;
 mod output;
 mod results;
 mod run;
+mod selection;
 mod subject;
 
 pub use algorithm::Algorithm;
@@ -34,3 +35,4 @@ pub use results::{
 
 pub use compare::{Progress, compare};
 pub use error::EvalError;
+pub use selection::Selection;
