@@ -13,19 +13,24 @@ mod experiment;
 mod ideal;
 mod metrics;
 mod output;
+mod record;
 mod results;
 mod run;
+mod script;
 mod selection;
 mod subject;
 
 pub use algorithm::Algorithm;
 pub use camera_path::CameraPath;
-pub use experiment::{EqualQualitySpec, Experiment, IDEAL, SceneSource, SceneSpec};
+pub use experiment::{
+    Action, EqualQualitySpec, EventSpec, Experiment, Goal, IDEAL, MetricsSpec, Mover, SceneSource,
+    SceneSpec,
+};
 
 pub use subject::{Subject, SubjectTracer};
 
 pub use contender::{Arena, Contender, Shown};
-pub use ideal::{Ideals, refresh_time};
+pub use ideal::{IdealAtRest, IdealEvent, Ideals, refresh_time};
 pub use run::{Cell, run};
 
 pub use metrics::{Picture, changed_region, flip, mean, psnr_db, quantile, rmse, rmse_where, ssim};

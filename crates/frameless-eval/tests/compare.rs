@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use frameless_eval::{Experiment, Ideals, Picture, Progress, Results, Subject, compare, rmse};
+use frameless_eval::{Experiment, Ideals, Progress, Results, Subject, compare, rmse};
 
 /// Counts work; asks to stop after so much of it.
 struct Counting {
@@ -107,8 +107,8 @@ fn the_ideal_against_itself_is_exactly_zero() {
     let experiment = small();
     let subject = Subject::load(&experiment.scenes[0]).expect("built in");
     let trace = || Ideals::trace(&subject, &experiment, &|| (), &|| false).expect("not stopped");
-    let (a, b): (Vec<Picture>, Vec<Picture>) = (trace().pictures, trace().pictures);
-    assert!(a.iter().zip(&b).all(|(a, b)| rmse(a, b) == 0.0));
+    let (a, b) = (trace().pictures, trace().pictures);
+    assert!(a.iter().zip(b.iter()).all(|(a, b)| rmse(a, b) == 0.0));
     assert!(rmse(&a[0], &a[29]) > 0.0, "nothing moves");
 }
 

@@ -60,21 +60,25 @@ fn luma(picture: &[[f32; 3]]) -> Vec<f32> {
 fn blurred(values: &[f32], width: usize) -> Vec<f32> {
     let weights = gaussian();
     let narrow = width + 1 - WINDOW_PX;
-    let mut rows = Vec::with_capacity(values.len());
-    for row in values.chunks_exact(width) {
-        rows.extend((0..narrow).map(|x| -> f32 {
-            row[x..x + WINDOW_PX].iter().zip(&weights).map(|(value, weight)| value * weight).sum()
-        }));
+    let mut rows = vec![0.0; narrow * (values.len() / width)];
+    for (sums, row) in rows.chunks_exact_mut(narrow).zip(values.chunks_exact(width)) {
+        for (k, weight) in weights.iter().enumerate() {
+            add(sums, &row[k..k + narrow], *weight);
+        }
     }
     let height = values.len() / width + 1 - WINDOW_PX;
     let mut result = vec![0.0; narrow * height];
-    for (y, row) in result.chunks_exact_mut(narrow).enumerate() {
+    for (y, sums) in result.chunks_exact_mut(narrow).enumerate() {
         for (k, weight) in weights.iter().enumerate() {
-            let source = &rows[(y + k) * narrow..(y + k + 1) * narrow];
-            row.iter_mut().zip(source).for_each(|(sum, value)| *sum += value * weight);
+            add(sums, &rows[(y + k) * narrow..(y + k + 1) * narrow], *weight);
         }
     }
     result
+}
+
+/// A loop over whole rows, which the compiler turns into vector instructions.
+fn add(sums: &mut [f32], values: &[f32], weight: f32) {
+    sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value * weight);
 }
 
 /// exp(−x²/2σ²) for x = −5 … 5, with sum 1.
