@@ -8,13 +8,18 @@ mod camera_path;
 mod compare;
 mod contender;
 mod contenders;
+mod difference;
 mod error;
 mod experiment;
 mod ideal;
+#[cfg(test)]
+mod made_up;
 mod metrics;
 mod output;
+mod ranking;
 mod record;
 mod results;
+mod results_file;
 mod run;
 mod script;
 mod selection;
@@ -39,5 +44,7 @@ pub use results::{
 };
 
 pub use compare::{Progress, compare};
+pub use difference::{Difference, DifferenceRow, RunGroup, Verdict};
 pub use error::EvalError;
+pub use ranking::{Metric, Ranking, RankingRow};
 pub use selection::Selection;

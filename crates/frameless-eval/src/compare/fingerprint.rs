@@ -18,8 +18,13 @@ pub(super) fn fingerprint(source: &SceneSource) -> Result<String, EvalError> {
     let mut hash = Sha256::new();
     match source {
         SceneSource::Builtin(name) => {
-            let scene =
+            let mut scene =
                 frameless_scene::builtin(name).expect("checked when the experiment was read");
+            // Millions of texels would make a long text.
+            for image in std::mem::take(&mut scene.images) {
+                hash.update(format!("{}x{}\n", image.width, image.height));
+                hash.update(image.rgba.as_flattened());
+            }
             hash.update(format!("{scene:?}"));
         }
         SceneSource::File(path) => {

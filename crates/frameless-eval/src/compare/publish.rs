@@ -8,6 +8,7 @@ use crate::error::EvalError;
 use crate::experiment::Experiment;
 use crate::output::{OutputFolder, plot_curves};
 use crate::results::{RESULTS_VERSION, Results, RunResult};
+use crate::results_file::FORMAT;
 
 /// Writes results, report and pictures, and lets them appear.
 pub(super) fn publish(
@@ -23,7 +24,7 @@ pub(super) fn publish(
         write_curves(experiment, &spec.name, &outcome.runs, &pictures)?;
     }
     let mut results = Results {
-        format: "frameless results".into(),
+        format: FORMAT.into(),
         version: RESULTS_VERSION,
         title: experiment.title.clone(),
         unscored_refreshes: experiment.unscored,
