@@ -38,41 +38,47 @@ pub(super) enum Depth {
 }
 
 /// What every piece of work on a scene depends on.
-pub(super) struct SceneKey(String);
+pub(super) struct SceneKey {
+    text: String,
+    /// What a run tells if everything is measured.
+    measured: String,
+}
 
 impl SceneKey {
     /// # Errors
     /// If the scene's file cannot be read.
     pub(super) fn new(experiment: &Experiment, spec: &SceneSpec) -> Result<SceneKey, EvalError> {
-        let SceneSpec { source, camera, .. } = spec;
-        let Experiment { size, display_hz, refreshes, unscored, .. } = experiment;
-        Ok(SceneKey(format!(
+        let SceneSpec { source, camera, events, .. } = spec;
+        let Experiment { size, display_hz, refreshes, unscored, metrics, .. } = experiment;
+        let text = format!(
             "frameless cell, results version {RESULTS_VERSION}, code version {CODE_VERSION}\n\
              scene {}\n\
              camera {camera:?}\n\
+             events {events:?}\n\
              display {}x{} at {display_hz} Hz, {refreshes} refreshes of which {unscored} unscored\n",
             fingerprint(source)?,
             size.width,
             size.height,
-        )))
+        );
+        Ok(SceneKey { text, measured: format!("everything measured, {metrics:?}") })
     }
 
     /// Of one run.
     pub(super) fn run(&self, cell: &Cell, depth: Depth) -> Key {
         let Cell { scene: _, algorithm, samples_per_sec, seed } = cell;
         let measured = match depth {
-            Depth::Everything => "everything measured",
+            Depth::Everything => &self.measured,
             Depth::OnlyRmse => "only RMSE measured",
         };
         Key::new(format!(
             "{}run {}, {samples_per_sec} samples/s, seed {seed}, {measured}\n",
-            self.0,
+            self.text,
             algorithm.name()
         ))
     }
 
     /// Of pictures of some algorithms at one rate.
     pub(super) fn pictures(&self, what: &str) -> Key {
-        Key::new(format!("{}pictures {what}\n", self.0))
+        Key::new(format!("{}pictures {what}\n", self.text))
     }
 }

@@ -185,7 +185,12 @@ impl<'a> SceneWork<'a> {
             work.advance(cost);
             !work.should_stop()
         };
-        let result = run(cell, self.experiment, subject, ideals, &mut go_on)?;
+        let result = match depth {
+            Depth::Everything => run(cell, self.experiment, subject, ideals, &mut go_on)?,
+            Depth::OnlyRmse => {
+                run(cell, &self.experiment.with_error_only(), subject, ideals, &mut go_on)?
+            }
+        };
         self.store.keep_run(&self.key.run(cell, depth), &result)?;
         Ok(result)
     }

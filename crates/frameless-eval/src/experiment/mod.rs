@@ -140,6 +140,11 @@ pub enum SceneSource {
 pub const IDEAL: &str = "ideal";
 
 impl Experiment {
+    /// The same without the costly metrics.
+    pub(crate) fn with_error_only(&self) -> Experiment {
+        Experiment { metrics: MetricsSpec::ERROR_ONLY, ..self.clone() }
+    }
+
     /// Reads and checks an experiment file. Scene files are found relative to its folder; they are not opened yet.
     ///
     /// # Errors
