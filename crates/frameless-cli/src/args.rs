@@ -21,7 +21,7 @@ Examples:
   frameless view model.glb --sampler random
       your own scene, pixels chosen at random
   frameless compare experiments/figures.toml --out out/figures
-      how good is it? numbers, curves, pictures and a video
+      how good is it? numbers, a report with curves, pictures and a video
   frameless render sphere --time 0.5 -o sphere.png
       the ideal picture at one moment
 
@@ -126,20 +126,38 @@ impl Default for ViewArgs {
     }
 }
 
-/// Measure algorithms against the ideal picture: numbers, curves, pictures and a video
+/// Measure algorithms against the ideal picture, or two results against each other
 ///
-/// An experiment is a TOML file that names scenes, algorithms and sample rates; `experiments/` has some.
+/// An EXPERIMENT is a TOML file that names scenes, algorithms and sample rates; `experiments/` has some.
 /// Time is simulated: the same experiment gives the same numbers every time, on slow machines and fast ones.
+/// Every finished run is kept in the folder: after Ctrl-C, or a change of the experiment, the same command
+/// runs only what is missing.
+///
+/// A.json and B.json are the results.json of two comparisons. What changed from A to B is printed; if
+/// anything got worse by more than the spread over the seeds (and by more than 0.5 %), the exit code is 1.
 #[derive(ClapArgs)]
-#[command(after_help = "Example:
-  frameless compare experiments/figures.toml --out out/figures")]
+#[command(override_usage = "frameless compare <EXPERIMENT> --out <DIR> [--only <CELLS>]
+       frameless compare <A.json> <B.json>")]
+#[command(after_help = "Examples:
+  frameless compare experiments/figures.toml --out out/figures
+      numbers for programs (results.json), a report for people (report.html), curves, pictures, a video
+  frameless compare experiments/suite.toml --out out/suite --only scene=sphere,algorithm=change,rate=900000
+      a part of an experiment
+  frameless compare results/figures.json out/figures/results.json
+      did anything get worse?")]
 pub(crate) struct CompareArgs {
-    /// The experiment, a TOML file
-    pub(crate) experiment: PathBuf,
+    /// An experiment (a TOML file), or two results (JSON files, the older first)
+    #[arg(value_name = "FILE", required = true, num_args = 1..=2)]
+    pub(crate) files: Vec<PathBuf>,
 
-    /// The folder for numbers, curves, pictures and video; an earlier comparison there is replaced
+    /// The folder for numbers, report and pictures; an earlier comparison there is replaced
     #[arg(long, value_name = "DIR")]
-    pub(crate) out: PathBuf,
+    pub(crate) out: Option<PathBuf>,
+
+    /// Run a part of the experiment: scene=, algorithm=, rate=, seed=, with commas between; a key may come
+    /// twice
+    #[arg(long, value_name = "CELLS")]
+    pub(crate) only: Option<String>,
 }
 
 /// Trace the whole picture at one moment: the ideal that every algorithm is compared with

@@ -1,83 +1,52 @@
-//! `frameless compare`: algorithms against the ideal picture.
+//! `frameless compare`: algorithms against the ideal picture, or two results against each other.
 
-use std::fmt::Write;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+mod bar;
+mod difference;
+mod table;
 
-use anyhow::Context;
-use frameless_eval::{Experiment, Progress, Results, compare};
-use indicatif::{ProgressBar, ProgressStyle};
+use std::path::Path;
 
+use anyhow::anyhow;
+use frameless_eval::{EvalError, Experiment, Selection, compare};
+
+use self::bar::Bar;
 use crate::args::CompareArgs;
 use crate::failure::Failure;
 use crate::output;
 
-/// Run the experiment, write its folder, and print the errors.
+/// Run the experiment, write its folder, and print the errors; or print what changed between two results.
 pub(crate) fn run(args: &CompareArgs) -> Result<(), Failure> {
-    let experiment = Experiment::read(&args.experiment).map_err(Failure::bad_input)?;
+    let refused = |text: String| Err(Failure::bad_input(anyhow!("{text}; see --help")));
+    match (args.files.as_slice(), &args.out) {
+        ([experiment], Some(out)) => run_experiment(experiment, out, args.only.as_deref()),
+        ([file], None) if is_json(file) => {
+            refused(format!("{}: one result alone cannot be compared, wanted two", file.display()))
+        }
+        ([_], None) => refused("an experiment needs --out <DIR> for its results".into()),
+        ([a, b], None) if args.only.is_none() => difference::run(a, b),
+        _ => refused("--out and --only belong to an experiment, not to two results".into()),
+    }
+}
+
+fn is_json(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "json")
+}
+
+fn run_experiment(path: &Path, out: &Path, only: Option<&str>) -> Result<(), Failure> {
+    let mut experiment = Experiment::read(path).map_err(failure)?;
+    if let Some(only) = only {
+        let selected = Selection::parse(only).and_then(|selection| selection.of(experiment));
+        experiment =
+            selected.map_err(|text| Failure::bad_input(anyhow!("--only {only}: {text}")))?;
+    }
     let progress = Bar::new()?;
-    let results = compare(&experiment, &args.out, &progress).map_err(|error| {
-        if error.is_bad_input() { Failure::bad_input(error) } else { Failure::other(error) }
-    })?;
-    progress.bar.finish_and_clear();
-    let where_to = format!("\nresults, pictures and curves: {}\n", args.out.display());
-    Ok(output::print(&(table(&results) + &where_to))?)
+    let outcome = compare(&experiment, out, &progress);
+    progress.clear();
+    let results = outcome.map_err(failure)?;
+    let where_to = format!("\nreport: {}\n", out.join("report.html").display());
+    Ok(output::print(&(table::of(&results) + &where_to))?)
 }
 
-/// One line per run.
-fn table(results: &Results) -> String {
-    let mut table = format!("{}\n\n", output::printable(&results.title));
-    table += "mean RMSE against the ideal, in sRGB [0, 1]; p95: its 95th percentile over the refreshes\n";
-    table += "scene        samples/s  seed   mean    p95     algorithm\n";
-    for run in &results.runs {
-        // Writing to a string cannot fail.
-        let _ = writeln!(
-            table,
-            "{:12} {:<10} {:<6} {:.4}  {:.4}  {}",
-            run.scene,
-            run.samples_per_sec,
-            run.seed,
-            run.rmse.mean.unwrap_or(f64::NAN),
-            run.rmse.p95.unwrap_or(f64::NAN),
-            run.algorithm
-        );
-    }
-    table
-}
-
-/// A bar on the terminal, and Ctrl-C as the wish to stop before anything is written.
-struct Bar {
-    bar: ProgressBar,
-    interrupted: Arc<AtomicBool>,
-}
-
-impl Bar {
-    fn new() -> anyhow::Result<Bar> {
-        let interrupted = Arc::new(AtomicBool::new(false));
-        let stop = Arc::clone(&interrupted);
-        ctrlc::set_handler(move || stop.store(true, Ordering::Relaxed))
-            .context("cannot listen for Ctrl-C")?;
-        Ok(Bar { bar: ProgressBar::new(0), interrupted })
-    }
-}
-
-impl Progress for Bar {
-    fn begin(&self, pictures: u64) {
-        let style =
-            ProgressStyle::with_template("{bar:30} {pos}/{len} pictures, {eta} left · {msg}");
-        self.bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        self.bar.set_length(pictures);
-    }
-
-    fn stage(&self, what: &str) {
-        self.bar.set_message(what.to_owned());
-    }
-
-    fn advance(&self) {
-        self.bar.inc(1);
-    }
-
-    fn should_stop(&self) -> bool {
-        self.interrupted.load(Ordering::Relaxed)
-    }
+fn failure(error: EvalError) -> Failure {
+    if error.is_bad_input() { Failure::bad_input(error) } else { Failure::other(error) }
 }

@@ -3,7 +3,9 @@
 use frameless::{ReconstructionKind, SamplerKind};
 
 use crate::contender::{Arena, Contender};
-use crate::contenders::{Framed, FramedSingle, Frameless, LowRes, OracleHold, Progressive};
+use crate::contenders::{
+    Framed, FramedSingle, Frameless, LowRes, OracleHold, Progressive, Temporal,
+};
 
 /// A way of making pictures from samples.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,23 +23,26 @@ pub enum Algorithm {
     },
     /// `progressive`: clear on any change, low resolution while things change, then accumulate.
     Progressive,
+    /// `temporal`: jittered low-resolution frames that add up in a reprojected history.
+    Temporal,
     /// `oracle-hold`: knows the ideal; the reference for held pictures.
     OracleHold,
 }
 
 /// The algorithms without parameters.
-const PLAIN: [(&str, Algorithm); 6] = [
+const PLAIN: [(&str, Algorithm); 7] = [
     ("framed", Algorithm::Framed),
     ("framed-single", Algorithm::FramedSingle),
     ("lowres60", Algorithm::LowRes { refreshes_per_frame: 1 }),
     ("lowres30", Algorithm::LowRes { refreshes_per_frame: 2 }),
     ("progressive", Algorithm::Progressive),
+    ("temporal", Algorithm::Temporal),
     ("oracle-hold", Algorithm::OracleHold),
 ];
 
 impl Algorithm {
-    /// `random`, `permutation`, `change`, `framed`, `framed-single`, `lowres60`, `lowres30`, `progressive`, `oracle-hold`; with
-    /// parameters: `change(w_d=0.7,tile=8)`. After a sampler `+hold` may be written out.
+    /// `random`, `permutation`, `change`, `framed`, `framed-single`, `lowres60`, `lowres30`, `progressive`,
+    /// `temporal`, `oracle-hold`; with parameters: `change(w_d=0.7,tile=8)`. After a sampler `+hold` may be written out.
     ///
     /// # Errors
     /// What was wanted, if the name is not one of these.
@@ -82,6 +87,18 @@ impl Algorithm {
         }
     }
 
+    /// Whether the seed makes a difference; one seed is enough for those where it makes none.
+    pub fn is_seeded(&self) -> bool {
+        match self {
+            Algorithm::Frameless(..) | Algorithm::Progressive => true,
+            Algorithm::Framed
+            | Algorithm::FramedSingle
+            | Algorithm::LowRes { .. }
+            | Algorithm::Temporal
+            | Algorithm::OracleHold => false,
+        }
+    }
+
     /// The algorithm at work, at time 0.
     pub(crate) fn contender<'a>(&self, arena: Arena<'a>) -> Box<dyn Contender + 'a> {
         match *self {
@@ -94,6 +111,7 @@ impl Algorithm {
                 Box::new(LowRes::new(arena, refreshes_per_frame))
             }
             Algorithm::Progressive => Box::new(Progressive::new(arena)),
+            Algorithm::Temporal => Box::new(Temporal::new(arena)),
             Algorithm::OracleHold => Box::new(OracleHold::contender(arena)),
         }
     }

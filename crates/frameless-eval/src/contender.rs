@@ -11,11 +11,30 @@ use crate::subject::Subject;
 /// The run calls [`show`](Contender::show) once per refresh, in order. By then the contender may have traced rate · time samples, none
 /// of them at a time later than the refresh.
 pub trait Contender {
-    /// The picture that the display shows at `time`.
+    /// What the display shows at `time`; whatever `shown` held before is overwritten.
     ///
     /// # Errors
     /// If the tracer returns a colour that is not finite.
-    fn show(&mut self, time: Time, picture: &mut Picture) -> Result<(), EngineError>;
+    fn show(&mut self, time: Time, shown: &mut Shown) -> Result<(), EngineError>;
+}
+
+/// What a display shows at a refresh.
+#[derive(Clone, Debug, Default)]
+pub struct Shown {
+    /// The picture.
+    pub picture: Picture,
+    /// Per pixel, how long before the refresh the moment was that it shows, in seconds; as many as pixels. Everybody starts
+    /// with the picture of time 0, which is of age t at time t.
+    pub age_secs: Vec<f32>,
+}
+
+impl Shown {
+    /// A picture that shows the moment `secs` everywhere.
+    pub(crate) fn show_moment(&mut self, picture: &Picture, secs: f64, now: Time) {
+        self.picture.clone_from(picture);
+        self.age_secs.clear();
+        self.age_secs.resize(picture.len(), (now.secs() - secs) as f32);
+    }
 }
 
 /// What every contender is given.

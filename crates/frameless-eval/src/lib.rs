@@ -8,29 +8,43 @@ mod camera_path;
 mod compare;
 mod contender;
 mod contenders;
+mod difference;
 mod error;
 mod experiment;
 mod ideal;
+#[cfg(test)]
+mod made_up;
 mod metrics;
 mod output;
+mod ranking;
+mod record;
 mod results;
+mod results_file;
 mod run;
+mod script;
+mod selection;
 mod subject;
 
 pub use algorithm::Algorithm;
 pub use camera_path::CameraPath;
-pub use experiment::{Experiment, IDEAL, SceneSource, SceneSpec};
+pub use experiment::{
+    Action, EqualQualitySpec, EventSpec, Experiment, Goal, IDEAL, MetricsSpec, Mover, SceneSource,
+    SceneSpec,
+};
 
 pub use subject::{Subject, SubjectTracer};
 
-pub use contender::{Arena, Contender};
-pub use ideal::{Ideals, refresh_time};
+pub use contender::{Arena, Contender, Shown};
+pub use ideal::{IdealAtRest, IdealEvent, Ideals, refresh_time};
 pub use run::{Cell, run};
 
-pub use metrics::{Picture, changed_region, mean, quantile, rmse, rmse_where};
+pub use metrics::{Picture, changed_region, flip, mean, psnr_db, quantile, rmse, rmse_where, ssim};
 pub use results::{
     AtRest, Bound, Curve, EqualQuality, EventResult, RESULTS_VERSION, Results, RunResult,
 };
 
 pub use compare::{Progress, compare};
+pub use difference::{Difference, DifferenceRow, RunGroup, Verdict};
 pub use error::EvalError;
+pub use ranking::{Metric, Ranking, RankingRow};
+pub use selection::Selection;

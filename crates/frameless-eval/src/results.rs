@@ -47,13 +47,15 @@ pub struct RunResult {
     pub refreshes: usize,
     /// Root mean squared error against the ideal, over all pixels and channels, in sRGB [0, 1].
     pub rmse: Curve,
-    /// Peak signal-to-noise ratio of the same, −20 log10(RMSE), in dB; `null` where the pictures are equal (infinite).
+    /// Peak signal-to-noise ratio of the same, −20 log10(RMSE), in dB; `null` where the pictures are equal (infinite): mean
+    /// and percentile are over the finite ones.
     pub psnr_db: Curve,
     /// RMSE over the pixels whose ideal has changed by more than 0.04 within the last 100 ms; `null` where none has.
     pub rmse_changed: Curve,
-    /// Structural similarity to the ideal (Wang et al. 2004), at every so many-th refresh.
+    /// Structural similarity to the ideal (Wang et al. 2004), over luma, in [−1, 1], at every so many-th refresh; `null` if a side
+    /// is shorter than 11 pixels.
     pub ssim: Curve,
-    /// Mean FLIP difference from the ideal (Andersson et al. 2020), at every so many-th refresh.
+    /// Mean FLIP difference from the ideal (Andersson et al. 2020), in [0, 1], at every so many-th refresh.
     pub flip: Curve,
     /// Mean age over the pixels, in seconds: how long ago the moment was that a pixel shows.
     pub age_secs: Curve,
@@ -74,7 +76,7 @@ pub struct Curve {
     /// 95th percentile over the same. For PSNR and SSIM, where low is bad, the 5th.
     pub p95: Option<f64>,
     /// Entry i is at refresh `(i + 1) · every − 1`, and refresh k at (k + 1) / display_hz seconds. Unscored refreshes are
-    /// included.
+    /// included. 0: not measured.
     pub every: usize,
     /// `null` where there is no value.
     pub values: Vec<Option<f64>>,
@@ -99,10 +101,11 @@ pub struct EventResult {
     pub name: String,
     /// When it happens, in seconds.
     pub secs: f64,
-    /// Pixels whose ideal it changes by more than 0.04 in a channel.
+    /// Pixels whose ideal it changes by more than 0.04 in a channel: against the ideal without the event, or 100 ms earlier where
+    /// something stops or the scene acts by itself.
     pub changed_pixels: usize,
-    /// From the event to the first refresh at which 90 % of them are within 0.05 of the ideal, in seconds; `null` if that
-    /// does not happen before the next event or the end, or if no pixel changes.
+    /// From the event (the end of a gradual one) to the first refresh at which 90 % of them are within 0.05 of the ideal in all
+    /// channels, in seconds; `null` if that does not happen before the next event or the end, or if no pixel changes.
     pub latency_secs: Option<f64>,
 }
 

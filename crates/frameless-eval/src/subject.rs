@@ -1,26 +1,29 @@
-//! What is looked at: a scene with the camera of the experiment.
+//! What is looked at: a scene with the camera and the events of the experiment.
 
 use std::sync::Arc;
 
 use frameless::{Answer, Batch, Pose, Request, Size, Surface, Tracer};
-use frameless_scene::{Limits, View};
+use frameless_scene::{Limits, State, View};
 use frameless_trace::{Moment, Settings, World};
 
 use crate::camera_path::CameraPath;
 use crate::error::EvalError;
-use crate::experiment::{SceneSource, SceneSpec};
+use crate::experiment::{EventSpec, SceneSource, SceneSpec};
+use crate::script::Script;
 
-/// A scene ready to be traced at any time.
+/// A scene ready to be traced at any time of the run.
 pub struct Subject {
     world: Arc<World>,
     camera: Option<CameraPath>,
+    events: Vec<EventSpec>,
+    script: Script,
 }
 
 impl Subject {
     /// Loads the scene and builds what the tracer needs.
     ///
     /// # Errors
-    /// If the scene's file cannot be loaded.
+    /// If the scene's file cannot be loaded, or an event speaks of something that the scene does not have.
     pub fn load(spec: &SceneSpec) -> Result<Subject, EvalError> {
         let scene = match &spec.source {
             SceneSource::Builtin(name) => {
@@ -28,13 +31,32 @@ impl Subject {
             }
             SceneSource::File(path) => frameless_scene::load(path, &Limits::default())?,
         };
-        Ok(Subject { world: Arc::new(World::new(Arc::new(scene))), camera: spec.camera.clone() })
+        let script = Script::bind(&spec.events, &scene)
+            .map_err(|message| EvalError::Script { scene: spec.name.clone(), message })?;
+        Ok(Subject {
+            world: Arc::new(World::new(Arc::new(scene))),
+            camera: spec.camera.clone(),
+            events: spec.events.clone(),
+            script,
+        })
+    }
+
+    /// What happens in this scene, by time.
+    pub fn events(&self) -> &[EventSpec] {
+        &self.events
+    }
+
+    /// The same without one of its events: what there would be if it did not happen.
+    pub(crate) fn without_event(&self, index: usize) -> Subject {
+        let mut events = self.events.clone();
+        events.remove(index);
+        let script = Script::bind(&events, self.world.scene()).expect("they were bound before");
+        Subject { world: self.world.clone(), camera: self.camera.clone(), events, script }
     }
 
     /// A renderer of this subject that traces on the calling thread; with `surfaces`, its answers say what was hit.
     pub fn tracer(&self, surfaces: bool) -> SubjectTracer<'_> {
-        let moment = self.world.moment(0.0);
-        SubjectTracer { subject: self, moment, surfaces, answer: None }
+        SubjectTracer { subject: self, moment: self.moment(0.0), surfaces, answer: None }
     }
 
     /// The whole picture at exactly `secs`, linear RGB, one sample per pixel at its centre: what an
@@ -46,7 +68,7 @@ impl Subject {
 
     /// Linear RGB of any pixels at exactly `secs`.
     pub fn trace(&self, secs: f64, size: Size, requests: &[Request]) -> Vec<[f32; 3]> {
-        self.trace_moment(&self.world.moment(secs), secs, size, requests, false).0
+        self.trace_moment(&self.moment(secs), secs, size, requests, false).0
     }
 
     /// Linear RGB of any pixels at exactly `secs`, and what was hit.
@@ -56,22 +78,45 @@ impl Subject {
         size: Size,
         requests: &[Request],
     ) -> (Vec<[f32; 3]>, Vec<Surface>) {
-        self.trace_moment(&self.world.moment(secs), secs, size, requests, true)
+        self.trace_moment(&self.moment(secs), secs, size, requests, true)
     }
 
     /// Where everything is in a picture of `size` at `secs`.
     pub fn pose(&self, secs: f64, size: Size) -> Pose {
-        let (moment, mut pose) = (self.world.moment(secs), Pose::default());
-        moment.pose(&self.view(&moment, secs), size, &mut pose);
+        let (moment, mut pose) = (self.moment(secs), Pose::default());
+        moment.pose(&self.view(moment.state(), secs), size, &mut pose);
         pose
     }
 
     /// Whether nothing that can be seen differs between two times: neither camera nor object nor light.
     pub fn is_still(&self, a_secs: f64, b_secs: f64) -> bool {
-        let (a, b) = (self.world.moment(a_secs), self.world.moment(b_secs));
-        let same_state = a.state().world_from_node == b.state().world_from_node
-            && a.state().light_intensity == b.state().light_intensity;
+        let (a, b) = (self.state(a_secs), self.state(b_secs));
+        let same_state =
+            a.world_from_node == b.world_from_node && a.light_intensity == b.light_intensity;
         same_state && self.view(&a, a_secs) == self.view(&b, b_secs)
+    }
+
+    fn state(&self, secs: f64) -> State {
+        let scene = self.world.scene();
+        let mut state = scene.state_at(self.script.scene_secs(secs));
+        self.script.apply(secs, scene, &mut state);
+        state
+    }
+
+    fn moment(&self, secs: f64) -> Moment {
+        let mut moment = self.world.moment(self.script.scene_secs(secs));
+        self.update_moment(secs, &mut moment);
+        moment
+    }
+
+    fn update_moment(&self, secs: f64, moment: &mut Moment) {
+        let scene_secs = self.script.scene_secs(secs);
+        if self.script.leaves_state_alone() {
+            return self.world.update_moment(scene_secs, moment);
+        }
+        self.world.update_moment_with(scene_secs, moment, |state| {
+            self.script.apply(secs, self.world.scene(), state);
+        });
     }
 
     fn trace_moment(
@@ -82,7 +127,7 @@ impl Subject {
         requests: &[Request],
         surfaces: bool,
     ) -> (Vec<[f32; 3]>, Vec<Surface>) {
-        let view = self.view(moment, secs);
+        let view = self.view(moment.state(), secs);
         let settings = Settings { surfaces, ..Settings::default() };
         let trace = |request: &Request| self.world.trace(moment, &view, size, request, &settings);
         if surfaces {
@@ -92,11 +137,12 @@ impl Subject {
         }
     }
 
-    fn view(&self, moment: &Moment, secs: f64) -> View {
-        match &self.camera {
-            Some(path) => path.view(secs),
-            None => self.world.scene().view_at(moment.state(), 0),
-        }
+    fn view(&self, state: &State, secs: f64) -> View {
+        let view = match &self.camera {
+            Some(path) => path.view(self.script.scene_secs(secs)),
+            None => self.world.scene().view_at(state, 0),
+        };
+        self.script.view(secs, view)
     }
 }
 
@@ -111,7 +157,7 @@ pub struct SubjectTracer<'a> {
 impl Tracer for SubjectTracer<'_> {
     fn submit(&mut self, batch: Batch) {
         let secs = batch.scene_secs;
-        self.subject.world.update_moment(secs, &mut self.moment);
+        self.subject.update_moment(secs, &mut self.moment);
         let (rgb, surfaces) = self.subject.trace_moment(
             &self.moment,
             secs,
@@ -127,8 +173,8 @@ impl Tracer for SubjectTracer<'_> {
     }
 
     fn pose(&mut self, scene_secs: f64, size: Size, pose: &mut Pose) -> bool {
-        self.subject.world.update_moment(scene_secs, &mut self.moment);
-        let view = self.subject.view(&self.moment, scene_secs);
+        self.subject.update_moment(scene_secs, &mut self.moment);
+        let view = self.subject.view(self.moment.state(), scene_secs);
         self.moment.pose(&view, size, pose);
         true
     }

@@ -3,33 +3,31 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use frameless_eval::{
-    EvalError, Experiment, Ideals, Picture, Progress, Results, Subject, compare, rmse,
-};
+use frameless_eval::{Experiment, Ideals, Progress, Results, Subject, compare, rmse};
 
-/// Counts pictures; asks to stop after `limit` of them.
+/// Counts work; asks to stop after so much of it.
 struct Counting {
-    made: AtomicU64,
-    announced: AtomicU64,
+    done: AtomicU64,
+    planned: AtomicU64,
     limit: u64,
 }
 
 impl Counting {
     fn new(limit: u64) -> Counting {
-        Counting { made: AtomicU64::new(0), announced: AtomicU64::new(0), limit }
+        Counting { done: AtomicU64::new(0), planned: AtomicU64::new(0), limit }
     }
 }
 
 impl Progress for Counting {
-    fn begin(&self, pictures: u64) {
-        self.announced.store(pictures, Ordering::Relaxed);
+    fn plan(&self, work: u64) {
+        self.planned.store(work, Ordering::Relaxed);
     }
     fn stage(&self, _what: &str) {}
-    fn advance(&self) {
-        self.made.fetch_add(1, Ordering::Relaxed);
+    fn advance(&self, work: u64) {
+        self.done.fetch_add(work, Ordering::Relaxed);
     }
     fn should_stop(&self) -> bool {
-        self.made.load(Ordering::Relaxed) >= self.limit
+        self.done.load(Ordering::Relaxed) >= self.limit
     }
 }
 
@@ -60,8 +58,13 @@ fn run_with_threads(threads: usize, out: &Path) -> Results {
 #[test]
 fn the_same_bytes_with_1_2_and_8_threads() {
     let parent = tempfile::tempdir().expect("a temporary folder");
-    let files =
-        ["results.json", "sphere-40000-500ms.png", "sphere-40000-rmse.svg", "sphere-40000.mp4"];
+    let files = [
+        "results.json",
+        "report.html",
+        "pictures/sphere-40000-500ms.png",
+        "pictures/sphere-40000-rmse.svg",
+        "pictures/sphere-40000.mp4",
+    ];
     let bytes = |threads: usize| {
         let out = parent.path().join(format!("{threads}"));
         run_with_threads(threads, &out);
@@ -78,11 +81,7 @@ fn results_say_what_was_asked_and_change_beats_random() {
     let out = parent.path().join("out");
     let progress = Counting::new(u64::MAX);
     let results = compare(&small(), &out, &progress).expect("it runs");
-    assert_eq!(
-        progress.made.into_inner(),
-        progress.announced.into_inner(),
-        "progress ends at 100 %"
-    );
+    assert_eq!(progress.done.into_inner(), progress.planned.into_inner(), "progress ends at 100 %");
 
     let text = std::fs::read_to_string(out.join("results.json")).expect("written");
     let read: Results = serde_json::from_str(&text).expect("as documented");
@@ -108,8 +107,8 @@ fn the_ideal_against_itself_is_exactly_zero() {
     let experiment = small();
     let subject = Subject::load(&experiment.scenes[0]).expect("built in");
     let trace = || Ideals::trace(&subject, &experiment, &|| (), &|| false).expect("not stopped");
-    let (a, b): (Vec<Picture>, Vec<Picture>) = (trace().pictures, trace().pictures);
-    assert!(a.iter().zip(&b).all(|(a, b)| rmse(a, b) == 0.0));
+    let (a, b) = (trace().pictures, trace().pictures);
+    assert!(a.iter().zip(b.iter()).all(|(a, b)| rmse(a, b) == 0.0));
     assert!(rmse(&a[0], &a[29]) > 0.0, "nothing moves");
 }
 
@@ -128,7 +127,7 @@ fn where_nothing_moves_any_more_the_held_picture_is_the_ideal_bit_for_bit() {
             "{}: the sphere rolls at 0.68 s",
             run.algorithm
         );
-        assert_eq!(run.rmse.values[149], 0.0, "{}", run.algorithm);
+        assert_eq!(run.rmse.values[149], Some(0.0), "{}", run.algorithm);
     }
 }
 
@@ -139,18 +138,7 @@ fn a_video_as_small_as_allowed_is_written() {
     let experiment = Experiment::parse(&text, Path::new("")).expect("64×64 with its bar");
     let out = tempfile::tempdir().expect("a temporary folder").path().join("out");
     compare(&experiment, &out, &Counting::new(u64::MAX)).expect("it runs");
-    assert!(out.join("sphere-40000.mp4").metadata().expect("written").len() > 1000);
-}
-
-#[test]
-fn an_interrupted_comparison_leaves_nothing_behind() {
-    let parent = tempfile::tempdir().expect("a temporary folder");
-    for limit in [0, 5, 40, 100] {
-        let outcome = compare(&small(), &parent.path().join("out"), &Counting::new(limit));
-        assert!(matches!(outcome, Err(EvalError::Interrupted)), "after {limit} pictures");
-        let left = parent.path().read_dir().expect("readable").count();
-        assert_eq!(left, 0, "after {limit} pictures");
-    }
+    assert!(out.join("pictures/sphere-40000.mp4").metadata().expect("written").len() > 1000);
 }
 
 #[test]

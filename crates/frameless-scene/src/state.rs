@@ -55,8 +55,9 @@ impl Scene {
         }
     }
 
-    /// World from node, in one pass: parents come before their children.
-    fn compose_world(&self, state: &mut State) {
+    /// Bring [`State::world_from_node`] up to date with [`State::parent_from_node`], for whoever moves something that the scene's
+    /// own animation does not. One pass: parents come before their children.
+    pub fn compose_world(&self, state: &mut State) {
         state.world_from_node.clear();
         for (node, transform) in self.nodes.iter().zip(&state.parent_from_node) {
             let parent_from_node = transform.affine();

@@ -65,8 +65,21 @@ impl World {
         if moment.shows == Some((self.id, secs)) {
             return;
         }
+        self.update_moment_with(secs, moment, |_| ());
+        moment.shows = Some((self.id, secs));
+    }
+
+    /// As [`World::update_moment`], but `change` may do something to the scene's state before anything is placed: move nodes (and
+    /// [compose](frameless_scene::Scene::compose_world) the world again), dim lights.
+    pub fn update_moment_with(
+        &self,
+        secs: f64,
+        moment: &mut Moment,
+        change: impl FnOnce(&mut State),
+    ) {
         let same_world = moment.shows.is_some_and(|(world, _)| world == self.id);
         self.scene().update_state(secs, &mut moment.state);
+        change(&mut moment.state);
         lights_now(self.scene(), &moment.state, &mut moment.lights);
         if !same_world {
             moment.placed.clear();
@@ -74,7 +87,8 @@ impl World {
         if self.place_instances(moment) || !same_world {
             moment.top.rebuild(&moment.placed, &self.blas);
         }
-        moment.shows = Some((self.id, secs));
+        // No time equals NaN: what the scene shows by itself at this time is another picture.
+        moment.shows = Some((self.id, f64::NAN));
     }
 
     /// Whether any instance has moved.

@@ -8,7 +8,7 @@
 
 use frameless::{EngineError, Time};
 
-use crate::contender::{Arena, Contender, encode};
+use crate::contender::{Arena, Contender, Shown, encode};
 use crate::metrics::Picture;
 
 pub(crate) struct Framed<'a> {
@@ -25,7 +25,7 @@ impl<'a> Framed<'a> {
 }
 
 impl Contender for Framed<'_> {
-    fn show(&mut self, time: Time, picture: &mut Picture) -> Result<(), EngineError> {
+    fn show(&mut self, time: Time, shown: &mut Shown) -> Result<(), EngineError> {
         let start = newest_frame_start(
             time,
             self.arena.frame_secs(self.arena.size.pixels()),
@@ -37,7 +37,7 @@ impl Contender for Framed<'_> {
                 self.picture = encode(&self.arena.subject.ideal(secs, self.arena.size));
             }
         }
-        picture.clone_from(&self.picture);
+        shown.show_moment(&self.picture, self.shown_secs.unwrap_or(0.0), time);
         Ok(())
     }
 }

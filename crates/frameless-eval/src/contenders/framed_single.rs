@@ -7,7 +7,7 @@
 
 use frameless::{EngineError, Request, Time};
 
-use crate::contender::{Arena, Contender, encode};
+use crate::contender::{Arena, Contender, Shown, encode};
 use crate::metrics::Picture;
 
 pub(crate) struct FramedSingle<'a> {
@@ -15,11 +15,14 @@ pub(crate) struct FramedSingle<'a> {
     /// Samples drawn so far; sample i is pixel i mod n of frame i / n.
     drawn: u64,
     picture: Picture,
+    /// Per pixel, when its frame was begun.
+    frame_secs: Vec<f64>,
 }
 
 impl<'a> FramedSingle<'a> {
     pub(crate) fn new(arena: Arena<'a>) -> FramedSingle<'a> {
-        FramedSingle { arena, drawn: 0, picture: encode(&arena.ideals.start) }
+        let frame_secs = vec![0.0; arena.size.pixels()];
+        FramedSingle { arena, drawn: 0, picture: encode(&arena.ideals.start), frame_secs }
     }
 
     /// Draws pixels `from..to` of frame number `frame`.
@@ -28,11 +31,12 @@ impl<'a> FramedSingle<'a> {
         let requests: Vec<Request> = (from as u32..to as u32).map(Request::centre).collect();
         let rgb = self.arena.subject.trace(secs, self.arena.size, &requests);
         self.picture[from..to].copy_from_slice(&encode(&rgb));
+        self.frame_secs[from..to].fill(secs);
     }
 }
 
 impl Contender for FramedSingle<'_> {
-    fn show(&mut self, time: Time, picture: &mut Picture) -> Result<(), EngineError> {
+    fn show(&mut self, time: Time, shown: &mut Shown) -> Result<(), EngineError> {
         let n = self.arena.size.pixels() as u64;
         let due = (time.secs() * self.arena.samples_per_sec).floor() as u64;
         // Rows that would be drawn over again before anybody sees them need not be traced.
@@ -43,7 +47,10 @@ impl Contender for FramedSingle<'_> {
             self.draw(frame, from as usize, to as usize);
             self.drawn += to - from;
         }
-        picture.clone_from(&self.picture);
+        shown.picture.clone_from(&self.picture);
+        let age_secs = |frame_secs: f64| (time.secs() - frame_secs) as f32;
+        shown.age_secs.clear();
+        shown.age_secs.extend(self.frame_secs.iter().map(|&secs| age_secs(secs)));
         Ok(())
     }
 }

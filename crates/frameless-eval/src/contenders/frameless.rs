@@ -4,8 +4,7 @@ use frameless::{
     Answer, Canvas, Clock, Engine, EngineError, ReconstructionKind, Request, Sampler, Time,
 };
 
-use crate::contender::{Arena, Contender};
-use crate::metrics::Picture;
+use crate::contender::{Arena, Contender, Shown};
 use crate::subject::SubjectTracer;
 
 /// The product itself, on the simulated clock.
@@ -42,13 +41,16 @@ impl<'a> Frameless<'a> {
 }
 
 impl Contender for Frameless<'_> {
-    fn show(&mut self, time: Time, picture: &mut Picture) -> Result<(), EngineError> {
+    fn show(&mut self, time: Time, shown: &mut Shown) -> Result<(), EngineError> {
         if let Some(error) = self.started.take() {
             return Err(error);
         }
         self.engine.run_until(time)?;
-        picture.clear();
-        picture.extend_from_slice(self.engine.refresh(time));
+        shown.picture.clear();
+        shown.picture.extend_from_slice(self.engine.refresh(time));
+        let traced = self.engine.canvas().time().iter();
+        shown.age_secs.clear();
+        shown.age_secs.extend(traced.map(|&traced| time.secs_since(traced) as f32));
         Ok(())
     }
 }

@@ -9,7 +9,7 @@
 use frameless::{EngineError, Request, Size, Time};
 
 use super::framed::newest_frame_start;
-use crate::contender::{Arena, Contender, encode};
+use crate::contender::{Arena, Contender, Shown, encode};
 use crate::metrics::Picture;
 
 pub(crate) struct LowRes<'a> {
@@ -35,7 +35,7 @@ impl<'a> LowRes<'a> {
 }
 
 impl Contender for LowRes<'_> {
-    fn show(&mut self, time: Time, picture: &mut Picture) -> Result<(), EngineError> {
+    fn show(&mut self, time: Time, shown: &mut Shown) -> Result<(), EngineError> {
         let refresh = (time.secs() * f64::from(self.arena.display_hz)).round() as u32;
         let interval_secs = f64::from(self.refreshes_per_frame) * self.arena.refresh_secs();
         if refresh.is_multiple_of(self.refreshes_per_frame) {
@@ -47,7 +47,7 @@ impl Contender for LowRes<'_> {
             }
             self.shown_secs = start;
         }
-        picture.clone_from(&self.picture);
+        shown.show_moment(&self.picture, self.shown_secs.unwrap_or(0.0).max(0.0), time);
         Ok(())
     }
 }

@@ -6,6 +6,7 @@ mod frameless;
 mod lowres;
 mod oracle_hold;
 mod progressive;
+mod temporal;
 
 pub(crate) use framed::Framed;
 pub(crate) use framed_single::FramedSingle;
@@ -13,3 +14,4 @@ pub(crate) use frameless::Frameless;
 pub(crate) use lowres::LowRes;
 pub(crate) use oracle_hold::OracleHold;
 pub(crate) use progressive::Progressive;
+pub(crate) use temporal::Temporal;

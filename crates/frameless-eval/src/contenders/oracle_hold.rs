@@ -8,7 +8,9 @@
 //! smallest errors come first, so that the largest are freshest at the refresh. It is greedy, refresh by
 //! refresh, and so no strict bound.
 
-use frameless::{ReconstructionKind, Canvas, Display, Request, Sampler, Time};
+use std::sync::Arc;
+
+use frameless::{Canvas, Display, ReconstructionKind, Request, Sampler, Time};
 
 use crate::contender::Arena;
 use crate::contenders::Frameless;
@@ -16,7 +18,7 @@ use crate::metrics::Picture;
 
 /// A sampler that peeks.
 pub(crate) struct OracleHold {
-    ideals: Vec<Picture>,
+    ideals: Arc<[Picture]>,
     display_hz: u32,
     samples_per_refresh: usize,
     /// The refresh for which `plan` was made.

@@ -11,7 +11,7 @@
 use frameless::{EngineError, Request, Rng, Size, Time};
 
 use super::lowres::{fitting_size, requests_of, upsampled};
-use crate::contender::{Arena, Contender, encode};
+use crate::contender::{Arena, Contender, Shown, encode};
 use crate::metrics::Picture;
 
 pub(crate) struct Progressive<'a> {
@@ -27,6 +27,9 @@ pub(crate) struct Progressive<'a> {
     sums: Vec<([f32; 3], u32)>,
     /// Samples accumulated since the last change.
     accumulated: usize,
+    /// When each pixel was traced last. At rest a sample shows the moment at which it is traced: nothing has changed since
+    /// `drawn_secs`.
+    traced_secs: Vec<f64>,
 }
 
 /// The frame rate that viewers hold while something changes.
@@ -45,6 +48,7 @@ impl<'a> Progressive<'a> {
             picture: encode(&arena.ideals.start),
             sums: vec![([0.0; 3], 0); arena.size.pixels()],
             accumulated: 0,
+            traced_secs: vec![0.0; arena.size.pixels()],
         }
     }
 
@@ -63,6 +67,7 @@ impl<'a> Progressive<'a> {
         self.picture = upsampled(&encode(&rgb), self.low, self.arena.size);
         self.sums.fill(([0.0; 3], 0));
         self.accumulated = 0;
+        self.traced_secs.fill(self.drawn_secs);
     }
 
     fn accumulate(&mut self, until: f64) {
@@ -86,13 +91,14 @@ impl<'a> Progressive<'a> {
             *count += 1;
             let mean = sum.map(|s| s / *count as f32);
             self.picture[request.pixel as usize] = encode(&[mean])[0];
+            self.traced_secs[request.pixel as usize] = self.busy_until;
         }
         self.accumulated += count;
     }
 }
 
 impl Contender for Progressive<'_> {
-    fn show(&mut self, time: Time, picture: &mut Picture) -> Result<(), EngineError> {
+    fn show(&mut self, time: Time, shown: &mut Shown) -> Result<(), EngineError> {
         loop {
             let (finished, moved) = self.plan();
             if finished > time.secs() + 1e-6 {
@@ -105,7 +111,9 @@ impl Contender for Progressive<'_> {
             }
             self.busy_until = finished;
         }
-        picture.clone_from(&self.picture);
+        shown.picture.clone_from(&self.picture);
+        shown.age_secs.clear();
+        shown.age_secs.extend(self.traced_secs.iter().map(|&secs| (time.secs() - secs) as f32));
         Ok(())
     }
 }

@@ -26,6 +26,8 @@ pub(super) enum Hole {
 pub(super) struct Gather {
     holes: Vec<Hole>,
     empty: Vec<u32>,
+    /// Of holes: when what they show was traced.
+    ticks: Vec<Tick>,
 }
 
 /// Below this expected error a sample is taken as it is.
@@ -37,6 +39,11 @@ impl Gather {
     /// Per pixel.
     pub(super) fn holes(&self) -> &[Hole] {
         &self.holes
+    }
+
+    /// When what a hole shows was traced.
+    pub(super) fn tick_of_hole(&self, pixel: usize) -> Tick {
+        self.ticks[pixel]
     }
 
     /// `contrast` per tile of `rates`, whose tiles are eight pixels wide.
@@ -51,14 +58,26 @@ impl Gather {
         self.holes.clear();
         self.holes.resize(picture.len(), Hole::No);
         self.empty.clear();
+        self.ticks.resize(picture.len(), Tick::default());
         let model = Model { store, now: Tick::of(now), rates, contrast };
         wide::run(Blocks { model, picture, empty: &mut self.empty });
         for &pixel in &self.empty {
-            let (rgb, hole) = model.fill(pixel, picture[pixel as usize]);
-            picture[pixel as usize] = rgb;
-            self.holes[pixel as usize] = hole;
+            let i = pixel as usize;
+            let Some((reference, reach)) = model.reference(pixel) else {
+                self.holes[i] = Hole::Large;
+                continue;
+            };
+            self.ticks[i] = Tick(store.tick[reference.cell]);
+            picture[i] = model.mean_around(pixel, reference.cell, reach);
+            self.holes[i] = reference.hole;
         }
     }
+}
+
+/// What a hole is filled from.
+struct Reference {
+    cell: usize,
+    hole: Hole,
 }
 
 /// The expected error of samples.
@@ -180,8 +199,8 @@ impl Model<'_> {
         [red / weights, green / weights, blue / weights]
     }
 
-    /// A pixel without a sample of its own, from what is known around it.
-    fn fill(&self, pixel: u32, before: [f32; 3]) -> ([f32; 3], Hole) {
+    /// For a pixel without a sample of its own: the nearest one around, and how many cells away samples were looked for.
+    fn reference(&self, pixel: u32) -> Option<(Reference, i32)> {
         let layout = &self.store.layout;
         let (x, y) = layout.size.xy(pixel);
         let n = layout.per_side as i32;
@@ -195,14 +214,14 @@ impl Model<'_> {
                     nearest = Some((i, distance2));
                 }
             });
-            if let Some((reference, _)) = nearest
+            if let Some((cell, _)) = nearest
                 && (count >= 2 || reach >= 3 * n)
             {
                 let hole = if count < 4 || reach > n { Hole::Large } else { Hole::Small };
-                return (self.mean_around(pixel, reference, reach), hole);
+                return Some((Reference { cell, hole }, reach));
             }
         }
-        (before, Hole::Large)
+        None
     }
 
     fn distance2(&self, i: usize, x: u32, y: u32) -> f32 {

@@ -109,11 +109,15 @@ impl Reconstruction for Reproject {
         self.gather.run(&self.store, refresh.now, rates, &self.contrast, picture);
         self.shown.clone_from(picture);
         holes::order(self.gather.holes(), size, &mut self.holes);
-        let (store, holes) = (&self.store, self.gather.holes());
+        let (store, gather) = (&self.store, &self.gather);
         canvas.update(&mut self.holes, |pixel| {
             let (x, y) = size.xy(pixel as u32);
-            let newest = store.newest(x, y).map(|i| Tick(store.tick[i]).time(refresh.now));
-            (newest.unwrap_or(Time::ZERO), holes[pixel] == gather::Hole::No)
+            let is_known = gather.holes()[pixel] == gather::Hole::No;
+            let tick = match store.newest(x, y) {
+                Some(newest) => Tick(store.tick[newest]),
+                None => gather.tick_of_hole(pixel),
+            };
+            (tick.time(refresh.now), is_known)
         });
     }
 }

@@ -1,158 +1,17 @@
-//! Experiments: what is compared, read from TOML and checked once.
-//!
-//! ```toml
-//! title = "The sketch's figures"
-//! algorithms = ["random", "permutation", "change"]   # default: these three
-//! samples_per_sec = [900_000]
-//! seeds = [1]                                         # default
-//! width = 512                                         # default
-//! height = 384                                        # default
-//! display_hz = 60                                     # default
-//! duration_secs = 2.5                                 # default
-//! unscored_secs = 0.5                                 # default: the start is not scored
-//!
-//! [[scenes]]
-//! scene = "sphere"        # built-in, or a glTF file relative to this file's folder
-//! name = "sphere"         # default: the scene's own name
-//! # camera = { orbit = { target = [0, 1, 0], radius = 4, height = 1, degrees_per_sec = 30 } }
-//! # camera = { keyframes = [{ time = 0, eye = [0, 1, 4], target = [0, 1, 0] }, …], yfov_degrees = 50 }
-//!
-//! [output]
-//! stills_secs = [1.0]     # which instants are shown as pictures
-//! show = ["random", "change", "ideal"]   # side by side, in stills and video; default: everything
-//! video = true            # default
-//! ```
-//!
-//! Unknown keys are refused.
+//! From what the file says to what can be run.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use frameless::Size;
-use serde::Deserialize;
 
+use super::event::check_events;
+use super::file::{EqualQualityTable, ExperimentFile, SceneTable};
+use super::{EqualQualitySpec, Experiment, IDEAL, MetricsSpec, SceneSource, SceneSpec};
 use crate::algorithm::Algorithm;
-use crate::camera_path::{CameraPath, CameraSpec};
-use crate::error::EvalError;
 use crate::output::strip_size;
-
-/// A checked experiment.
-#[derive(Clone, Debug)]
-pub struct Experiment {
-    /// For people.
-    pub title: String,
-    /// What is looked at; at least one.
-    pub scenes: Vec<SceneSpec>,
-    /// Who competes; at least one.
-    pub algorithms: Vec<Algorithm>,
-    /// Samples per second, positive; at least one.
-    pub samples_per_sec: Vec<f64>,
-    /// At least one.
-    pub seeds: Vec<u64>,
-    /// In pixels.
-    pub size: Size,
-    /// Refreshes of the display per second.
-    pub display_hz: u32,
-    /// Refreshes in a run; refresh k is at (k + 1) / display_hz.
-    pub refreshes: usize,
-    /// The first so many refreshes are not scored.
-    pub unscored: usize,
-    /// Instants shown as stills, as refresh indices.
-    pub stills: Vec<usize>,
-    /// Names shown side by side in stills and video; "ideal" among them.
-    pub show: Vec<String>,
-    /// Whether videos are made.
-    pub video: bool,
-}
-
-/// A scene of an experiment.
-#[derive(Clone, Debug)]
-pub struct SceneSpec {
-    /// Unique in the experiment; made of letters, digits, `-` and `_`, since files are named after it.
-    pub name: String,
-    /// Where it comes from.
-    pub source: SceneSource,
-    /// A camera of the experiment's own; otherwise the scene's first.
-    pub camera: Option<CameraPath>,
-}
-
-/// Where a scene comes from.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum SceneSource {
-    /// One of [`frameless_scene::BUILTIN_NAMES`].
-    Builtin(String),
-    /// A glTF file.
-    File(PathBuf),
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ExperimentFile {
-    title: String,
-    #[serde(default = "default_algorithms")]
-    algorithms: Vec<String>,
-    samples_per_sec: Vec<f64>,
-    #[serde(default = "default_seeds")]
-    seeds: Vec<u64>,
-    #[serde(default = "default_width")]
-    width: u32,
-    #[serde(default = "default_height")]
-    height: u32,
-    #[serde(default = "default_display_hz")]
-    display_hz: u32,
-    #[serde(default = "default_duration_secs")]
-    duration_secs: f64,
-    #[serde(default = "default_unscored_secs")]
-    unscored_secs: f64,
-    scenes: Vec<SceneTable>,
-    #[serde(default)]
-    output: OutputTable,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SceneTable {
-    scene: String,
-    name: Option<String>,
-    camera: Option<CameraSpec>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct OutputTable {
-    #[serde(default)]
-    stills_secs: Vec<f64>,
-    #[serde(default)]
-    show: Vec<String>,
-    video: Option<bool>,
-}
-
-fn default_algorithms() -> Vec<String> {
-    ["random", "permutation", "change"].map(String::from).to_vec()
-}
-fn default_seeds() -> Vec<u64> {
-    vec![1]
-}
-fn default_width() -> u32 {
-    512
-}
-fn default_height() -> u32 {
-    384
-}
-fn default_display_hz() -> u32 {
-    60
-}
-fn default_duration_secs() -> f64 {
-    2.5
-}
-fn default_unscored_secs() -> f64 {
-    0.5
-}
 
 // Least side, largest width and largest height of a video: the limits of the H.264 encoder, a little above its least.
 const VIDEO_SIDES: (u32, u32, u32) = (64, 3840, 2160);
-
-/// The name of the ideal instantaneous renderer in `show`, stills and videos.
-pub const IDEAL: &str = "ideal";
 
 // A picture of 16,384² pixels as f32 RGB takes 3 GiB; beyond that nobody means it.
 const LARGEST_SIDE: u32 = 16_384;
@@ -161,35 +20,12 @@ const LONGEST_RUN_REFRESHES: f64 = 100_000.0;
 const BYTES_PER_PIXEL: f64 = 13.0;
 // A hundred times the sketch's rate; a second of more would take minutes to simulate.
 const MOST_SAMPLES_PER_SEC: f64 = 1e8;
+// Nobody waits for more.
+const LARGEST_FACTOR: f64 = 4096.0;
 const MOST_BYTES: f64 = 8.0 * (1u64 << 30) as f64;
 
-impl Experiment {
-    /// Reads and checks an experiment file. Scene files are found relative to its folder; they are not opened yet.
-    ///
-    /// # Errors
-    /// If the file cannot be read, is not TOML, has an unknown key, or asks for something impossible; the message
-    /// names the file and the line or key.
-    pub fn read(path: &Path) -> Result<Experiment, EvalError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| EvalError::Unreadable { path: path.to_path_buf(), source })?;
-        let folder = path.parent().unwrap_or(Path::new(""));
-        Experiment::parse(&text, folder)
-            .map_err(|message| EvalError::Invalid { path: path.to_path_buf(), message })
-    }
-
-    /// As [`Experiment::read`], from text. The error says what is wrong and where in the text.
-    pub fn parse(text: &str, folder: &Path) -> Result<Experiment, String> {
-        let file: ExperimentFile = toml::from_str(text).map_err(|error| {
-            let before = error.span().map_or("", |span| &text[..span.start]);
-            let line = before.matches('\n').count() + 1;
-            let column = before.chars().rev().take_while(|&c| c != '\n').count() + 1;
-            format!("line {line}, column {column}: {}", error.message())
-        })?;
-        check(file, folder)
-    }
-}
-
-fn check(file: ExperimentFile, folder: &Path) -> Result<Experiment, String> {
+/// The experiment that a file asks for, or what is wrong with it.
+pub(super) fn check(file: ExperimentFile, folder: &Path) -> Result<Experiment, String> {
     let sides = [file.width, file.height];
     if !sides.iter().all(|side| (1..=LARGEST_SIDE).contains(side)) {
         return Err(format!(
@@ -246,7 +82,7 @@ fn check(file: ExperimentFile, folder: &Path) -> Result<Experiment, String> {
     }
     let mut scenes: Vec<SceneSpec> = Vec::new();
     for table in file.scenes {
-        let spec = check_scene(table, folder)?;
+        let spec = check_scene(table, folder, file.duration_secs)?;
         if scenes.iter().any(|other| other.name == spec.name) {
             return Err(format!("two scenes are called {:?}; give one another name", spec.name));
         }
@@ -261,6 +97,8 @@ fn check(file: ExperimentFile, folder: &Path) -> Result<Experiment, String> {
         Err(format!("stills_secs: {secs} is not within the run of {} s", file.duration_secs))
     });
     let stills = stills.collect::<Result<_, _>>()?;
+    let equal_quality = file.equal_quality.map(|table| checked_equal_quality(table, &algorithms));
+    let equal_quality = equal_quality.transpose()?;
     let show = checked_show(file.output.show, &algorithms)?;
     let size = Size::new(file.width, file.height);
     let video = file.output.video.unwrap_or(true);
@@ -280,6 +118,11 @@ fn check(file: ExperimentFile, folder: &Path) -> Result<Experiment, String> {
         stills,
         show,
         video,
+        metrics: MetricsSpec {
+            ssim_every: file.metrics.ssim_every,
+            flip_every: file.metrics.flip_every,
+        },
+        equal_quality,
     })
 }
 
@@ -298,7 +141,7 @@ fn check_video(size: Size, pictures: usize) -> Result<(), String> {
     ))
 }
 
-fn check_scene(table: SceneTable, folder: &Path) -> Result<SceneSpec, String> {
+fn check_scene(table: SceneTable, folder: &Path, duration_secs: f64) -> Result<SceneSpec, String> {
     let (source, own_name) = if frameless_scene::BUILTIN_NAMES.contains(&table.scene.as_str()) {
         (SceneSource::Builtin(table.scene.clone()), table.scene.clone())
     } else if table.scene.ends_with(".glb") || table.scene.ends_with(".gltf") {
@@ -321,7 +164,9 @@ fn check_scene(table: SceneTable, folder: &Path) -> Result<SceneSpec, String> {
     }
     let camera =
         table.camera.map(|spec| spec.check().map_err(|e| format!("camera of {name:?}: {e}")));
-    Ok(SceneSpec { name, source, camera: camera.transpose()? })
+    let events = check_events(table.events, duration_secs)
+        .map_err(|message| format!("events of {name:?}: {message}"))?;
+    Ok(SceneSpec { name, source, camera: camera.transpose()?, events })
 }
 
 fn checked_show(show: Vec<String>, algorithms: &[Algorithm]) -> Result<Vec<String>, String> {
@@ -331,4 +176,34 @@ fn checked_show(show: Vec<String>, algorithms: &[Algorithm]) -> Result<Vec<Strin
         return Err(format!("show: {stranger:?} is not among {}", known.join(", ")));
     }
     Ok(if show.is_empty() { known } else { show })
+}
+
+fn checked_equal_quality(
+    table: EqualQualityTable,
+    known: &[Algorithm],
+) -> Result<EqualQualitySpec, String> {
+    if !(table.max_factor > 1.0 && table.max_factor <= LARGEST_FACTOR) {
+        return Err(format!(
+            "equal_quality.max_factor must be more than 1 and at most {LARGEST_FACTOR}, got {}",
+            table.max_factor
+        ));
+    }
+    let among = |key: &str, names: Vec<String>| -> Result<Vec<Algorithm>, String> {
+        if names.is_empty() {
+            return Err(format!("equal_quality.{key} is empty: at least one is needed"));
+        }
+        let find = |name: &String| {
+            let algorithm = Algorithm::from_name(name)?;
+            let is_known = known.contains(&algorithm);
+            is_known
+                .then_some(algorithm)
+                .ok_or_else(|| format!("equal_quality.{key}: {name:?} is not among the algorithms"))
+        };
+        names.iter().map(find).collect()
+    };
+    Ok(EqualQualitySpec {
+        algorithms: among("algorithms", table.algorithms)?,
+        opponents: among("opponents", table.opponents)?,
+        max_factor: table.max_factor,
+    })
 }

@@ -1,5 +1,11 @@
 //! How far a picture is from the ideal. Pictures are display-referred sRGB in [0, 1], row-major.
 
+mod flip;
+mod ssim;
+
+pub use flip::flip;
+pub use ssim::ssim;
+
 /// A picture: display-referred sRGB in [0, 1] per pixel, row-major.
 pub type Picture = Vec<[f32; 3]>;
 
@@ -22,6 +28,11 @@ pub fn rmse_where(mask: &[bool], a: &[[f32; 3]], b: &[[f32; 3]]) -> Option<f64> 
     (count > 0).then(|| (sum / (3 * count) as f64).sqrt())
 }
 
+/// Peak signal-to-noise ratio −20 log₁₀(RMSE) in dB, for values in [0, 1]; `None` for equal pictures, where it is infinite.
+pub fn psnr_db(rmse: f64) -> Option<f64> {
+    (rmse > 0.0).then(|| -20.0 * rmse.log10())
+}
+
 fn squared_distance(a: &[f32; 3], b: &[f32; 3]) -> f64 {
     (0..3).map(|k| f64::from(a[k] - b[k]).powi(2)).sum()
 }
@@ -37,10 +48,15 @@ pub fn changed_region<'a>(
     let mut changed = vec![false; now.len()];
     for earlier in ideals {
         for ((changed, a), b) in changed.iter_mut().zip(earlier).zip(now) {
-            *changed |= (0..3).any(|k| (a[k] - b[k]).abs() > CHANGED_BY_MORE_THAN);
+            *changed |= differ(a, b, CHANGED_BY_MORE_THAN);
         }
     }
     changed
+}
+
+/// Whether two colours differ by more than `tolerance` in any channel.
+pub(crate) fn differ(a: &[f32; 3], b: &[f32; 3], tolerance: f32) -> bool {
+    (0..3).any(|k| (a[k] - b[k]).abs() > tolerance)
 }
 
 /// Mean of the values; `None` of none.
@@ -81,6 +97,13 @@ mod tests {
         );
         assert_eq!(rmse_where(&[false, true], &a, &b), Some(0.0));
         assert_eq!(rmse_where(&[false, false], &a, &b), None);
+    }
+
+    #[test]
+    fn psnr_by_hand() {
+        assert_eq!(psnr_db(1.0), Some(0.0));
+        assert!((psnr_db(0.1).expect("finite") - 20.0).abs() < 1e-12);
+        assert_eq!(psnr_db(0.0), None);
     }
 
     #[test]
