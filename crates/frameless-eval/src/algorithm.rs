@@ -125,7 +125,8 @@ const SUFFIXES: [(&str, ReconstructionKind); 4] = [
 ];
 
 fn split_reconstruction(name: &str) -> (&str, ReconstructionKind) {
-    let found = SUFFIXES.iter().find_map(|(suffix, kind)| Some((name.strip_suffix(suffix)?, *kind)));
+    let found =
+        SUFFIXES.iter().find_map(|(suffix, kind)| Some((name.strip_suffix(suffix)?, *kind)));
     found.unwrap_or((name, ReconstructionKind::Hold))
 }
 

@@ -15,7 +15,8 @@ pub(crate) fn rank(x: u32, y: u32, bits: u32) -> u32 {
 /// The pixels (x, y) of a square of side 2^`bits` in their order.
 pub(crate) fn order(bits: u32) -> Vec<(u32, u32)> {
     let side = 1 << bits;
-    let mut pixels: Vec<(u32, u32)> = (0..side).flat_map(|y| (0..side).map(move |x| (x, y))).collect();
+    let mut pixels: Vec<(u32, u32)> =
+        (0..side).flat_map(|y| (0..side).map(move |x| (x, y))).collect();
     pixels.sort_by_key(|&(x, y)| rank(x, y, bits));
     pixels
 }

@@ -12,6 +12,7 @@ pub struct Canvas {
     known: Vec<bool>,
     holes: Vec<u32>,
     holes_found: u64,
+    holes_at: Time,
 }
 
 impl Canvas {
@@ -38,6 +39,7 @@ impl Canvas {
             known: vec![true; size.pixels()],
             holes: Vec::new(),
             holes_found: 0,
+            holes_at: Time::ZERO,
         }
     }
 
@@ -68,10 +70,15 @@ impl Canvas {
         &self.known
     }
 
-    /// Pixels of which nothing was known when this was last found out, the most urgent first. Some may have been traced
-    /// since.
+    /// Pixels that wait to be traced, the most urgent first: those of which nothing is known, then those that are shown by
+    /// samples beside their centres although nothing moves any more.
     pub fn holes(&self) -> &[u32] {
         &self.holes
+    }
+
+    /// Whether a pixel has not been traced since [`Canvas::holes`] was made.
+    pub fn still_waits(&self, pixel: u32) -> bool {
+        !self.known[pixel as usize] || self.time[pixel as usize] <= self.holes_at
     }
 
     /// How often [`Canvas::holes`] has been made anew.
@@ -80,7 +87,13 @@ impl Canvas {
     }
 
     /// What every pixel shows has been found out anew: when it was traced, and where nothing is known.
-    pub(crate) fn update(&mut self, holes: &mut Vec<u32>, mut state: impl FnMut(usize) -> (Time, bool)) {
+    pub(crate) fn update(
+        &mut self,
+        now: Time,
+        holes: &mut Vec<u32>,
+        mut state: impl FnMut(usize) -> (Time, bool),
+    ) {
+        self.holes_at = now;
         for (pixel, (time, known)) in self.time.iter_mut().zip(&mut self.known).enumerate() {
             (*time, *known) = state(pixel);
         }
@@ -121,6 +134,7 @@ impl Canvas {
             known: source.iter().map(|&i| self.known[i]).collect(),
             holes: coarse_to_fine(size),
             holes_found: self.holes_found + 1,
+            holes_at: self.holes_at,
         }
     }
 }

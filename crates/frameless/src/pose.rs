@@ -8,7 +8,7 @@ use crate::Surface;
 ///
 /// A renderer fills it in [`Tracer::pose`](crate::Tracer::pose); a surface point sampled earlier is then found again
 /// with [`Pose::project`].
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pose {
     /// Per object number: picture from the object's coordinates.
     pub picture_from_object: Vec<Projection>,

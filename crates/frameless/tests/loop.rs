@@ -269,7 +269,10 @@ fn resizing_and_changing_the_sampler_keep_the_picture() {
 #[test]
 fn observations_before_the_first_choice_are_harmless() {
     let mut sampler = Change::new(0.9, 16, 1);
-    sampler.observe(&canvas, &[Observation { pixel: 3, now: Time(5), previous: Time(2), known: true, change: 1.0 }]);
+    sampler.observe(
+        &canvas,
+        &[Observation { pixel: 3, now: Time(5), previous: Time(2), known: true, change: 1.0 }],
+    );
     let mut requests = Vec::new();
     sampler.choose(Time(9), &Canvas::new(Size::new(8, 8)), 10, &mut requests);
     assert_eq!(requests.len(), 10);

@@ -18,8 +18,10 @@ fn of_tile(picture: &[[f32; 3]], grid: &TileGrid, tile: usize) -> f32 {
     for y in rect.y0..rect.y1 {
         for x in (rect.x0..rect.x1).step_by(2) {
             let here = picture[(y * width + x) as usize];
-            let beside = picture[(y * width + if x + 1 < width { x + 1 } else { x.saturating_sub(1) }) as usize];
-            let below = picture[(if y + 1 < height { y + 1 } else { y.saturating_sub(1) } * width + x) as usize];
+            let beside = picture
+                [(y * width + if x + 1 < width { x + 1 } else { x.saturating_sub(1) }) as usize];
+            let below = picture
+                [(if y + 1 < height { y + 1 } else { y.saturating_sub(1) } * width + x) as usize];
             for k in 0..3 {
                 sum += (here[k] - beside[k]).powi(2) + (here[k] - below[k]).powi(2);
             }

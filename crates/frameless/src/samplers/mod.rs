@@ -35,12 +35,8 @@ impl SamplerKind {
     pub const CHANGE: SamplerKind = SamplerKind::Change { w_d: DEFAULT_W_D, tile: DEFAULT_TILE };
 
     /// Every kind with its default parameters.
-    pub const ALL: [SamplerKind; 4] = [
-        SamplerKind::Random,
-        SamplerKind::Permutation,
-        SamplerKind::CHANGE,
-        SamplerKind::Adaptive,
-    ];
+    pub const ALL: [SamplerKind; 4] =
+        [SamplerKind::Random, SamplerKind::Permutation, SamplerKind::CHANGE, SamplerKind::Adaptive];
 
     /// The name used on the command line and in experiments.
     pub fn name(&self) -> &'static str {

@@ -5,8 +5,7 @@ use super::store::surface;
 use crate::{Request, Time};
 
 /// Where to look for a surface in a hole: the farthest of these neighbours has probably been uncovered.
-const AROUND: [[i32; 2]; 8] =
-    [[3, 0], [-3, 0], [0, 3], [0, -3], [6, 0], [-6, 0], [0, 6], [0, -6]];
+const AROUND: [[i32; 2]; 8] = [[3, 0], [-3, 0], [0, 3], [0, -3], [6, 0], [-6, 0], [0, 6], [0, -6]];
 /// Faster surfaces (pixels per refresh) are not aimed at.
 const FASTEST_PX: f32 = 200.0;
 

@@ -8,18 +8,26 @@
 //! The reference is the pixel's own sample with the least expected error, or, in a hole, the nearest one within five pixels.
 
 use super::store::{EMPTY, Store, Tick};
+use crate::Time;
 use crate::rates::Rates;
 use crate::wide::{self, F8, M8};
-use crate::Time;
 
 /// Whether a pixel had a sample of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Hole {
     No,
+    /// There is one, but not at the pixel's centre, and nothing moves that could have carried it there.
+    OffCentre,
     /// Neighbours know enough for a good guess.
     Small,
     /// Nothing near is known.
     Large,
+}
+
+impl Hole {
+    pub(super) fn is_unknown(self) -> bool {
+        matches!(self, Hole::Small | Hole::Large)
+    }
 }
 
 #[derive(Default)]
@@ -32,6 +40,8 @@ pub(super) struct Gather {
 
 /// Below this expected error a sample is taken as it is.
 const EXACT: f32 = 2e-5;
+/// A sample so near to the centre is as good as one at the centre: rounding of its projected position.
+const CENTRAL_PX: f32 = 0.002;
 /// How far around a hole samples are looked for, in pixels.
 const REACH: u32 = 5;
 
@@ -39,6 +49,23 @@ impl Gather {
     /// Per pixel.
     pub(super) fn holes(&self) -> &[Hole] {
         &self.holes
+    }
+
+    /// After a picture in which nothing moves: samples beside their pixel's centre are to be traced again, where the
+    /// picture will rest.
+    pub(super) fn find_off_centre(&mut self, store: &Store) {
+        let size = store.layout.size;
+        for (pixel, hole) in self.holes.iter_mut().enumerate().filter(|(_, h)| **h == Hole::No) {
+            let (x, y) = size.xy(pixel as u32);
+            let is_central = |&i: &usize| {
+                let (dx, dy) =
+                    (store.px[0][i] - (x as f32 + 0.5), store.px[1][i] - (y as f32 + 0.5));
+                store.object[i] != EMPTY && dx * dx + dy * dy < CENTRAL_PX * CENTRAL_PX
+            };
+            if !store.of_pixel(x, y).any(|i| is_central(&i)) {
+                *hole = Hole::OffCentre;
+            }
+        }
     }
 
     /// When what a hole shows was traced.
@@ -225,7 +252,8 @@ impl Model<'_> {
     }
 
     fn distance2(&self, i: usize, x: u32, y: u32) -> f32 {
-        let (dx, dy) = (self.store.px[0][i] - (x as f32 + 0.5), self.store.px[1][i] - (y as f32 + 0.5));
+        let (dx, dy) =
+            (self.store.px[0][i] - (x as f32 + 0.5), self.store.px[1][i] - (y as f32 + 0.5));
         dx * dx + dy * dy
     }
 

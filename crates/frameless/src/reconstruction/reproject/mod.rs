@@ -71,8 +71,9 @@ impl Reconstruction for Reproject {
     fn keep(&mut self, kept: &Kept<'_>, display: &Display, changes: &mut Vec<f32>) {
         self.fit(kept.size);
         for i in 0..kept.requests.len() {
-            let sample = store::Sample::new(kept, i, display);
+            let mut sample = store::Sample::new(kept, i, display);
             let found = self.residual(&sample, display.encode(kept.old[i]));
+            sample.depth = found.depth;
             self.store.insert(&sample, found.outdated);
             changes.push(found.change);
         }
@@ -97,7 +98,10 @@ impl Reconstruction for Reproject {
         self.interval_secs = refresh.now.secs_since(self.shown_at) as f32;
         self.refreshes += 1;
         self.shown_at = refresh.now;
-        self.warp.run(&mut self.store, &self.poses[0]);
+        let at_rest = self.refreshes >= 2 && self.poses[0] == self.poses[1];
+        if !at_rest {
+            self.warp.run(&mut self.store, &self.poses[0]);
+        }
         let rates = refresh.rates.unwrap_or_else(|| {
             self.no_rates.get_or_insert_with(|| Rates::new(TileGrid::new(size, 8)))
         });
@@ -107,12 +111,15 @@ impl Reconstruction for Reproject {
         tile_contrast(&self.shown, &rates.grid, &mut self.contrast);
         picture.clone_from(&self.shown);
         self.gather.run(&self.store, refresh.now, rates, &self.contrast, picture);
+        if at_rest {
+            self.gather.find_off_centre(&self.store);
+        }
         self.shown.clone_from(picture);
         holes::order(self.gather.holes(), size, &mut self.holes);
         let (store, gather) = (&self.store, &self.gather);
-        canvas.update(&mut self.holes, |pixel| {
+        canvas.update(refresh.now, &mut self.holes, |pixel| {
             let (x, y) = size.xy(pixel as u32);
-            let is_known = gather.holes()[pixel] == gather::Hole::No;
+            let is_known = !gather.holes()[pixel].is_unknown();
             let tick = match store.newest(x, y) {
                 Some(newest) => Tick(store.tick[newest]),
                 None => gather.tick_of_hole(pixel),

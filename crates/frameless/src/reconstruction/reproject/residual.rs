@@ -13,6 +13,8 @@ pub(super) struct Found {
     pub(super) change: f32,
     /// Whether the pixel's other samples show something that is no longer there.
     pub(super) outdated: bool,
+    /// Of the sample, where its surface was at the last refresh.
+    pub(super) depth: f32,
 }
 
 /// Per channel; where nothing can be compared, a quarter of the range is assumed to have changed.
@@ -29,16 +31,17 @@ impl Reproject {
         let rgb = sample.rgb;
         if self.refreshes == 0 || sample.object == SCREEN {
             let change = squared(rgb, old);
-            return Found { change, outdated: change > 3.0 * OUTDATED };
+            return Found { change, outdated: change > 3.0 * OUTDATED, depth: f32::INFINITY };
         }
         let size = self.store.layout.size;
         let surface = sample.surface();
-        let then = self.poses[0].project(&surface).map(|there| there.px);
+        let then = self.poses[0].project(&surface);
+        let depth = then.map_or(f32::INFINITY, |there| there.depth);
         let inside = |px: &[f32; 2]| {
             px[0] >= 0.0 && px[1] >= 0.0 && px[0] < size.width as f32 && px[1] < size.height as f32
         };
-        let Some(px) = then.filter(inside) else {
-            return Found { change: UNKNOWN, outdated: true };
+        let Some(px) = then.map(|there| there.px).filter(inside) else {
+            return Found { change: UNKNOWN, outdated: true, depth };
         };
         let raw = squared(rgb, self.nearest(px)).min(squared(rgb, self.bilinear(px)));
         let outdated = raw > 3.0 * OUTDATED;
@@ -48,7 +51,7 @@ impl Reproject {
                 dx * dx + dy * dy > AT_REST_PX * AT_REST_PX
             });
         let change = if moving { self.beyond_range(px, rgb) + RAW * raw } else { raw };
-        Found { change, outdated }
+        Found { change, outdated, depth }
     }
 
     fn at(&self, x: i32, y: i32) -> [f32; 3] {

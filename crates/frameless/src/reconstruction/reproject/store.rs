@@ -130,7 +130,9 @@ impl Layout {
             return Some(first);
         }
         let n = self.per_side as f32;
-        let sub = |p: f32, whole: i32| (((p - whole as f32) * n) as usize).min(self.per_side as usize - 1);
+        let sub = |p: f32, whole: i32| {
+            (((p - whole as f32) * n) as usize).min(self.per_side as usize - 1)
+        };
         Some(first + self.plane * (sub(y, row) * self.per_side as usize + sub(x, column)))
     }
 
@@ -199,19 +201,21 @@ impl Store {
         self.object[i] == EMPTY
     }
 
+    /// The cells of a pixel.
+    #[inline(always)]
+    pub(super) fn of_pixel(&self, x: u32, y: u32) -> impl Iterator<Item = usize> + use<> {
+        let (first, plane) = (self.layout.of_pixel(x as i32, y as i32), self.layout.plane);
+        (0..(self.layout.per_side * self.layout.per_side) as usize)
+            .map(move |sub| first + sub * plane)
+    }
+
     /// The cell of the newest sample in a pixel.
     #[inline(always)]
     pub(super) fn newest(&self, x: u32, y: u32) -> Option<usize> {
-        let first = self.layout.of_pixel(x as i32, y as i32);
-        let mut newest = None;
-        for sub in 0..(self.layout.per_side * self.layout.per_side) as usize {
-            let i = first + sub * self.layout.plane;
-            let later = |other: usize| Tick(self.tick[i]).is_later_than(Tick(self.tick[other]));
-            if !self.is_empty(i) && newest.is_none_or(later) {
-                newest = Some(i);
-            }
-        }
-        newest
+        let samples = self.of_pixel(x, y).filter(|&i| !self.is_empty(i));
+        samples.reduce(|newest, i| {
+            if Tick(self.tick[i]).is_later_than(Tick(self.tick[newest])) { i } else { newest }
+        })
     }
 
     /// Puts a sample into its cell. `outdated`: the pixel's others show something that is no longer there.

@@ -1,7 +1,7 @@
 //! The forward step: every sample to where its surface is now.
 //!
 //! Where two samples meet in a cell, the nearer one stays if it is nearer by 1.5 %. On the same surface the newer one stays, and
-//! the other moves to the neighbouring cell on its side, if that is empty. At last what is seen through the cracks between a nearer
+//! the other moves to the neighbouring cell on its side, if that is empty; so it is with samples whose surface is not known. At last what is seen through the cracks between a nearer
 //! object's samples is taken away.
 
 use super::store::{Anchor, EMPTY, SCREEN, Sample, Store, surface};
@@ -66,9 +66,10 @@ impl Warp {
             }
             let there = there as usize;
             let (depth, other) = (self.depth[i], self.depth[there]);
-            if depth < other * (1.0 - SAME_SURFACE) {
+            let on_screen = store.object[i] == SCREEN || store.object[there] == SCREEN;
+            if !on_screen && depth < other * (1.0 - SAME_SURFACE) {
                 self.winner[cell] = i as u32;
-            } else if depth <= other * (1.0 + SAME_SURFACE) {
+            } else if on_screen || depth <= other * (1.0 + SAME_SURFACE) {
                 let is_newer = store.tick[i].wrapping_sub(store.tick[there]) as i32 > 0;
                 let (winner, loser) = if is_newer { (i, there) } else { (there, i) };
                 self.winner[cell] = winner as u32;
@@ -78,7 +79,8 @@ impl Warp {
     }
 
     fn rebuild(&mut self, store: &mut Store) {
-        let next = self.next.get_or_insert_with(|| Store::new(store.layout.size, store.layout.per_side));
+        let next =
+            self.next.get_or_insert_with(|| Store::new(store.layout.size, store.layout.per_side));
         if next.layout != store.layout {
             *next = Store::new(store.layout.size, store.layout.per_side);
         }
@@ -175,7 +177,8 @@ impl wide::Task for Carry<'_> {
     #[inline(always)]
     fn run(self) {
         let Carry { store, pose, px: [px, py], depth } = self;
-        let blocks = px.chunks_exact_mut(8).zip(py.chunks_exact_mut(8)).zip(depth.chunks_exact_mut(8));
+        let blocks =
+            px.chunks_exact_mut(8).zip(py.chunks_exact_mut(8)).zip(depth.chunks_exact_mut(8));
         for (block, ((px, py), depth)) in blocks.enumerate() {
             let start = 8 * block;
             let objects = &store.object[start..start + 8];

@@ -36,7 +36,8 @@ impl Front {
                     return;
                 }
                 let age_secs = observed.now.secs_since(canvas.time()[pixel as usize]) as f32;
-                if pixel != observed.pixel && age_secs >= FRESH_SECS && !self.queued[pixel as usize] {
+                if pixel != observed.pixel && age_secs >= FRESH_SECS && !self.queued[pixel as usize]
+                {
                     self.queued[pixel as usize] = true;
                     self.queue.push_back((pixel, observed.now));
                 }

@@ -92,7 +92,7 @@ impl State {
         while requests.len() < end {
             let Some(&pixel) = canvas.holes().get(self.next_hole) else { return };
             self.next_hole += 1;
-            if !canvas.known()[pixel as usize] {
+            if canvas.still_waits(pixel) {
                 self.take(pixel, Why::Hole, requests);
             }
         }
@@ -134,7 +134,8 @@ impl Sampler for Adaptive {
     }
 
     fn observe(&mut self, canvas: &Canvas, observations: &[Observation]) {
-        let Some(state) = self.state.as_mut().filter(|s| s.generation == canvas.generation()) else {
+        let Some(state) = self.state.as_mut().filter(|s| s.generation == canvas.generation())
+        else {
             return;
         };
         for observed in observations {
@@ -158,9 +159,6 @@ impl Sampler for Adaptive {
     fn inspect(&self, _now: Time, canvas: &Canvas) -> Insight {
         let Some(state) = &self.state else { return Insight::default() };
         let pixels = 0..canvas.size().pixels() as u32;
-        Insight {
-            change: pixels.map(|p| state.rates.of_pixel(p)).collect(),
-            ..Insight::default()
-        }
+        Insight { change: pixels.map(|p| state.rates.of_pixel(p)).collect(), ..Insight::default() }
     }
 }
