@@ -17,7 +17,7 @@ from PIL import Image
 from skimage.metrics import mean_squared_error, structural_similarity
 
 # RMSE: single against double precision. SSIM: single precision in the variances, over tens of thousands of windows.
-# FLIP: 1.7 of the authors' program against the 1.2 that the crate nv-flip contains.
+# FLIP: version 1.7 of the authors' program against the older one inside the crate nv-flip, which filters in another order.
 TOLERANCES = {"rmse": 1e-6, "psnr_db": 1e-3, "ssim": 1e-5, "flip": 1e-4}
 
 
