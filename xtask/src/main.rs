@@ -4,6 +4,7 @@ mod command;
 mod missing;
 mod picture;
 mod program;
+mod python;
 mod steps;
 mod test;
 mod window;

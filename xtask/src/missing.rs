@@ -46,6 +46,13 @@ pub(crate) fn to_build() -> Vec<Missing> {
     missing
 }
 
+/// Needed for an environment with Python packages of its own.
+pub(crate) fn to_make_a_venv() -> Option<Missing> {
+    let purpose = "our metrics are checked against Python packages";
+    let is_there = runs("python3", &["-c", "import ensurepip, venv"]);
+    (!is_there).then(|| debian("python3 with venv", purpose, "python3-venv"))
+}
+
 /// Needed to open the window on a virtual screen.
 pub(crate) fn to_open_a_window() -> Vec<Missing> {
     let mut missing = Vec::new();

@@ -17,6 +17,7 @@ pub(crate) fn everything() -> bool {
     steps.step("formatting", formatting);
     steps.step("clippy", clippy);
     steps.step("tests", cargo_test);
+    steps.step("metrics against Python", || crate::python::metrics(&out_dir("metrics")?));
     steps.step("build the program", || build().map(|_| Done::passed("")));
     steps.step("the program", || program::as_a_user(&program()?, &out_dir("program")?));
     steps.step("a comparison", || program::a_comparison(&program()?, &out_dir("comparison")?));

@@ -2,12 +2,14 @@
 
 use std::path::Path;
 
-use super::pictures::{VIDEO, pictured_rate, still_name};
+use super::pictures::{VIDEO, panel_name, pictured_rate, pictured_refreshes, still_name};
 use super::scene_work::SceneOutcome;
+use crate::algorithm::Algorithm;
 use crate::error::EvalError;
 use crate::experiment::Experiment;
-use crate::output::{OutputFolder, plot_curves};
-use crate::results::{RESULTS_VERSION, Results, RunResult};
+use crate::ideal::refresh_time;
+use crate::output::{Instant, OutputFolder, Report, ScenePictures, error_chart};
+use crate::results::{RESULTS_VERSION, Results};
 use crate::results_file::FORMAT;
 
 /// Writes results, report and pictures, and lets them appear.
@@ -19,10 +21,6 @@ pub(super) fn publish(
     let partial = folder.partial()?;
     let pictures = partial.path().join("pictures");
     std::fs::create_dir(&pictures).map_err(|e| EvalError::unwritable(&pictures, e))?;
-    for (spec, outcome) in experiment.scenes.iter().zip(&outcomes) {
-        copy_pictures(experiment, &spec.name, &outcome.pictures, &pictures)?;
-        write_curves(experiment, &spec.name, &outcome.runs, &pictures)?;
-    }
     let mut results = Results {
         format: FORMAT.into(),
         version: RESULTS_VERSION,
@@ -31,15 +29,48 @@ pub(super) fn publish(
         runs: Vec::new(),
         equal_quality: Vec::new(),
     };
-    for outcome in outcomes {
+    let mut in_report = Vec::new();
+    for (spec, outcome) in experiment.scenes.iter().zip(outcomes) {
+        copy_pictures(experiment, &spec.name, &outcome.pictures, &pictures)?;
+        in_report.push(scene_pictures(experiment, &outcome.pictures));
         results.runs.extend(outcome.runs);
         results.equal_quality.extend(outcome.equal_quality);
     }
+    for (scene, rate) in scenes_and_rates(&results) {
+        let svg = error_chart(&results, &scene, rate).standalone();
+        write(&pictures.join(format!("{scene}-{rate}-rmse.svg")), svg)?;
+    }
+    let pictured_rate = pictured_rate(experiment);
+    let report = Report { results: &results, pictured_rate, pictures: in_report };
+    write(&partial.path().join("report.html"), report.page()?)?;
     let json = serde_json::to_string_pretty(&results).expect("plain data");
     write(&partial.path().join("results.json"), json + "\n")?;
-    write(&partial.path().join("report.html"), String::new())?;
     folder.publish(partial)?;
     Ok(results)
+}
+
+fn scenes_and_rates(results: &Results) -> Vec<(String, f64)> {
+    let rates = results.rates();
+    let of =
+        |scene: String| rates.iter().map(move |&rate| (scene.clone(), rate)).collect::<Vec<_>>();
+    results.scenes().into_iter().flat_map(of).collect()
+}
+
+/// Where the report finds the pictures of a scene.
+fn scene_pictures(experiment: &Experiment, folder: &Path) -> ScenePictures {
+    let names = || experiment.algorithms.iter().map(Algorithm::name).enumerate();
+    let instant = |refresh: usize| Instant {
+        refresh,
+        secs: refresh_time(refresh, experiment.display_hz).secs(),
+        ideal: folder.join(panel_name(refresh, None)),
+        panels: names()
+            .map(|(i, name)| (name, folder.join(panel_name(refresh, Some(i)))))
+            .collect(),
+    };
+    ScenePictures {
+        video: experiment.video.then(|| folder.join(VIDEO)),
+        instants: pictured_refreshes(experiment).into_iter().map(instant).collect(),
+    }
 }
 
 /// Stills and video under names that say what they show.
@@ -60,21 +91,6 @@ fn copy_pictures(
     }
     if experiment.video {
         copy(VIDEO, format!("{scene}-{rate}.mp4"))?;
-    }
-    Ok(())
-}
-
-/// One chart per rate.
-fn write_curves(
-    experiment: &Experiment,
-    scene: &str,
-    runs: &[RunResult],
-    to: &Path,
-) -> Result<(), EvalError> {
-    for &rate in &experiment.samples_per_sec {
-        let at_rate: Vec<&RunResult> =
-            runs.iter().filter(|run| run.samples_per_sec == rate).collect();
-        plot_curves(&to.join(format!("{scene}-{rate}-rmse.svg")), scene, &at_rate)?;
     }
     Ok(())
 }

@@ -39,7 +39,7 @@ use super::lowres::fitting_size;
 use crate::contender::{Arena, Contender, Shown, encode};
 
 const TUNING: Tuning =
-    Tuning { kernel_px: 0.35, resampled: 0.8, gamma: 3.0, slack: 0.02, doubt: 0.02 };
+    Tuning { kernel_px: 0.35, resampled: 0.8, gamma: 6.0, slack: 0.02, doubt: 0.02 };
 
 pub(crate) struct Temporal<'a> {
     arena: Arena<'a>,

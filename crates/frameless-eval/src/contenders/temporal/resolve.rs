@@ -132,7 +132,9 @@ impl<'a> Resolve<'a> {
 
         let (past, trust) = self.past(footprint, found);
         let kept = found.past.weight * trust;
-        let t = if weight > 0.0 { weight / (weight + kept) } else { 0.0 };
+        // A history that was sampled at the centre, and that nothing casts doubt on, gains nothing from samples beside it.
+        let is_known = !found.moved && kept > SHARP;
+        let t = if weight > 0.0 && !is_known { weight / (weight + kept) } else { 0.0 };
         Past {
             colour: std::array::from_fn(|k| past[k] + t * (present[k] - past[k])),
             weight: (weight + kept).min(1.0),

@@ -1,0 +1,101 @@
+//! Ranked tables: one per rate and metric, of which one is seen at a time.
+
+use maud::{Markup, html};
+
+use crate::ranking::{Metric, Ranking, RankingRow};
+use crate::results::Results;
+
+pub(super) fn section(results: &Results) -> Markup {
+    let measured = |metric: &Metric| results.runs.iter().any(|run| metric.of(run).is_some());
+    let metrics: Vec<Metric> = Metric::ALL.into_iter().filter(measured).collect();
+    html! {
+        section #ranking {
+            h2 { "Ranking" }
+            div.switch data-switch="metric" role="group" aria-label="metric" {
+                @for (i, metric) in metrics.iter().enumerate() {
+                    button type="button" value=(metric.name()) aria-pressed=(i == 0) { (metric.name()) }
+                }
+            }
+            @for &metric in &metrics {
+                div data-metric=(metric.name()) {
+                    p.note { (metric.explanation()) " Means over refreshes and seeds; click a column to sort by it." }
+                    @for rate in results.rates() {
+                        div.scroll data-rate=(rate) { (table(&Ranking::new(results, rate, metric), metric)) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn table(ranking: &Ranking, metric: Metric) -> Markup {
+    let mean = if metric.is_mean_geometric() { "geometric mean" } else { "mean" };
+    let columns: Vec<Vec<Option<f64>>> =
+        std::iter::once(ranking.rows.iter().map(|r| r.mean).collect())
+            .chain(
+                (0..ranking.scenes.len())
+                    .map(|i| ranking.rows.iter().map(|r| r.by_scene[i]).collect()),
+            )
+            .collect();
+    let scales: Vec<Scale> = columns.iter().map(|values| Scale::of(values, metric)).collect();
+    html! {
+        table.sortable.numbers {
+            thead {
+                tr {
+                    th.name scope="col" { "algorithm" }
+                    th scope="col" title={ "over " (ranking.scenes.join(", ")) } { (mean) }
+                    @for scene in &ranking.scenes { th scope="col" { (scene) } }
+                }
+            }
+            tbody {
+                @for row in &ranking.rows {
+                    tr.reference[is_reference(row)] {
+                        th.name scope="row" { (row.algorithm) }
+                        (cell(row.mean, &scales[0], metric))
+                        @for (value, scale) in row.by_scene.iter().zip(&scales[1..]) {
+                            (cell(*value, scale, metric))
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Oracles know the ideal: they are no competitors, but what could be reached.
+fn is_reference(row: &RankingRow) -> bool {
+    row.algorithm.starts_with("oracle")
+}
+
+fn cell(value: Option<f64>, scale: &Scale, metric: Metric) -> Markup {
+    let Some(value) = value else { return html! { td data-value="" { "–" } } };
+    html! {
+        td.best[value == scale.best] data-value=(value) style=(format!("--share:{:.2}", scale.share(value))) {
+            (metric.shown(value))
+        }
+    }
+}
+
+/// From the worst of a column to its best.
+struct Scale {
+    best: f64,
+    worst: f64,
+}
+
+impl Scale {
+    fn of(values: &[Option<f64>], metric: Metric) -> Scale {
+        let present = || values.iter().copied().flatten();
+        let (low, high) =
+            (present().fold(f64::INFINITY, f64::min), present().fold(f64::NEG_INFINITY, f64::max));
+        if metric.is_higher_better() {
+            Scale { best: high, worst: low }
+        } else {
+            Scale { best: low, worst: high }
+        }
+    }
+
+    /// 0 for the worst, 1 for the best; 1 where all are equal.
+    fn share(&self, value: f64) -> f64 {
+        if self.best == self.worst { 1.0 } else { (value - self.worst) / (self.best - self.worst) }
+    }
+}

@@ -1,0 +1,72 @@
+//! Our metrics beside other people's: a Python script with packages of its own, in the project's `.venv`.
+
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+
+use anyhow::{Result, ensure};
+
+use crate::command::{cargo, output_within, run};
+use crate::missing;
+use crate::steps::Done;
+
+const REQUIREMENTS: &str = "crates/frameless-eval/tests/python/requirements.txt";
+const SCRIPT: &str = "crates/frameless-eval/tests/python/check_metrics.py";
+
+/// Wheels of 60 MB over a slow line.
+const INSTALLS_WITHIN: Duration = Duration::from_secs(300);
+const CHECKS_WITHIN: Duration = Duration::from_secs(120);
+
+/// Measures pairs of pictures with our program, and lets Python check the values. What it looked at stays in `out`.
+pub(crate) fn metrics(out: &Path) -> Result<Done> {
+    if let Some(missing) = missing::to_make_a_venv() {
+        return Ok(Done::skipped(format!("metrics against Python: {missing}")));
+    }
+    if let Err(error) = install() {
+        return Ok(Done::skipped(format!(
+            "metrics against Python: the packages of {REQUIREMENTS} could not be installed: {error:#}"
+        )));
+    }
+    let folder = out.to_string_lossy();
+    let example = ["run", "-q", "-p", "frameless-eval", "--example", "metric_pairs", "--"];
+    let mut pairs = cargo(&example);
+    pairs.arg(&*folder);
+    run(pairs)?;
+    let output = output_within(python().arg(SCRIPT).arg(&*folder), CHECKS_WITHIN)?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    ensure!(
+        output.status.success(),
+        "metrics and Python disagree:\n{text}{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    Ok(Done::passed(text.lines().last().unwrap_or_default()))
+}
+
+/// Makes the environment if there is none; asks nobody on the network if everything is there.
+fn install() -> Result<()> {
+    if !crate::project_dir().join(PYTHON).exists() {
+        let mut venv = Command::new("python3");
+        venv.args(["-m", "venv", ".venv"]).current_dir(crate::project_dir());
+        checked(&mut venv)?;
+    }
+    let mut pip = python();
+    pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
+    pip.args(["--only-binary", ":all:", "-r", REQUIREMENTS]);
+    checked(&mut pip)
+}
+
+const PYTHON: &str = if cfg!(windows) { ".venv/Scripts/python.exe" } else { ".venv/bin/python" };
+
+fn python() -> Command {
+    let mut python = Command::new(crate::project_dir().join(PYTHON));
+    python.current_dir(crate::project_dir());
+    python
+}
+
+fn checked(command: &mut Command) -> Result<()> {
+    let output = output_within(command, INSTALLS_WITHIN)?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    let last_line = said.lines().rfind(|line| !line.is_empty()).unwrap_or_default();
+    ensure!(output.status.success(), "{last_line}");
+    Ok(())
+}
