@@ -270,7 +270,7 @@ fn resizing_and_changing_the_sampler_keep_the_picture() {
 fn observations_before_the_first_choice_are_harmless() {
     let mut sampler = Change::new(0.9, 16, 1);
     sampler.observe(
-        &canvas,
+        &Canvas::new(Size::new(4, 4)),
         &[Observation { pixel: 3, now: Time(5), previous: Time(2), known: true, change: 1.0 }],
     );
     let mut requests = Vec::new();

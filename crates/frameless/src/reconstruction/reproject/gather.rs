@@ -5,8 +5,10 @@
 //! w_j = 1 / (e_j + ε)²                  over the samples of the reference's object
 //! ```
 //!
-//! The reference is the pixel's own sample with the least expected error, or, in a hole, the nearest one within five pixels.
+//! The reference is the pixel's own sample with the least expected error. Pixels without one are holes; they show what the nearest
+//! pixel shows that is none ([`fill`](super::fill)).
 
+use super::fill;
 use super::store::{EMPTY, Store, Tick};
 use crate::Time;
 use crate::rates::Rates;
@@ -34,16 +36,14 @@ impl Hole {
 pub(super) struct Gather {
     holes: Vec<Hole>,
     empty: Vec<u32>,
-    /// Of holes: when what they show was traced.
-    ticks: Vec<Tick>,
+    /// Per pixel the one whose sample it shows.
+    source: Vec<u32>,
 }
 
 /// Below this expected error a sample is taken as it is.
 const EXACT: f32 = 2e-5;
 /// A sample so near to the centre is as good as one at the centre: rounding of its projected position.
 const CENTRAL_PX: f32 = 0.002;
-/// How far around a hole samples are looked for, in pixels.
-const REACH: u32 = 5;
 
 impl Gather {
     /// Per pixel.
@@ -68,9 +68,10 @@ impl Gather {
         }
     }
 
-    /// When what a hole shows was traced.
-    pub(super) fn tick_of_hole(&self, pixel: usize) -> Tick {
-        self.ticks[pixel]
+    /// The pixel whose sample a pixel shows: itself, unless it is a hole; `None` if nothing is known anywhere.
+    pub(super) fn source(&self, pixel: usize) -> Option<u32> {
+        let source = self.source[pixel];
+        (source != fill::NOBODY).then_some(source)
     }
 
     /// `contrast` per tile of `rates`, whose tiles are eight pixels wide.
@@ -85,26 +86,17 @@ impl Gather {
         self.holes.clear();
         self.holes.resize(picture.len(), Hole::No);
         self.empty.clear();
-        self.ticks.resize(picture.len(), Tick::default());
         let model = Model { store, now: Tick::of(now), rates, contrast };
         wide::run(Blocks { model, picture, empty: &mut self.empty });
+        fill::nearest(store.layout.size, &self.empty, &mut self.source);
         for &pixel in &self.empty {
             let i = pixel as usize;
-            let Some((reference, reach)) = model.reference(pixel) else {
-                self.holes[i] = Hole::Large;
-                continue;
-            };
-            self.ticks[i] = Tick(store.tick[reference.cell]);
-            picture[i] = model.mean_around(pixel, reference.cell, reach);
-            self.holes[i] = reference.hole;
+            if let Some(source) = self.source(i) {
+                picture[i] = picture[source as usize];
+            }
+            self.holes[i] = fill::kind(store.layout.size, &self.source, pixel);
         }
     }
-}
-
-/// What a hole is filled from.
-struct Reference {
-    cell: usize,
-    hole: Hole,
 }
 
 /// The expected error of samples.
@@ -224,73 +216,6 @@ impl Model<'_> {
             }
         }
         [red / weights, green / weights, blue / weights]
-    }
-
-    /// For a pixel without a sample of its own: the nearest one around, and how many cells away samples were looked for.
-    fn reference(&self, pixel: u32) -> Option<(Reference, i32)> {
-        let layout = &self.store.layout;
-        let (x, y) = layout.size.xy(pixel);
-        let n = layout.per_side as i32;
-        let mut nearest: Option<(usize, f32)> = None;
-        let mut count = 0;
-        for reach in 1..=(REACH * layout.per_side) as i32 {
-            self.ring(x as i32, y as i32, reach, true, |i| {
-                count += 1;
-                let distance2 = self.distance2(i, x, y);
-                if nearest.is_none_or(|(_, least)| distance2 < least) {
-                    nearest = Some((i, distance2));
-                }
-            });
-            if let Some((cell, _)) = nearest
-                && (count >= 2 || reach >= 3 * n)
-            {
-                let hole = if count < 4 || reach > n { Hole::Large } else { Hole::Small };
-                return Some((Reference { cell, hole }, reach));
-            }
-        }
-        None
-    }
-
-    fn distance2(&self, i: usize, x: u32, y: u32) -> f32 {
-        let (dx, dy) =
-            (self.store.px[0][i] - (x as f32 + 0.5), self.store.px[1][i] - (y as f32 + 0.5));
-        dx * dx + dy * dy
-    }
-
-    fn mean_around(&self, pixel: u32, reference: usize, reach: i32) -> [f32; 3] {
-        let (x, y) = self.store.layout.size.xy(pixel);
-        let tile = self.rates.grid.tile_of(pixel);
-        let (v, s) = (self.rates.of_tile(tile), self.contrast[tile]);
-        let (mut sum, mut weights) = ([0.0; 3], 0.0);
-        self.ring(x as i32, y as i32, reach, false, |i| {
-            if self.store.object[i] == self.store.object[reference] {
-                let age_secs = Tick(self.store.tick[i]).secs_until(self.now);
-                let error = v * age_secs + s * self.distance2(i, x, y) + least_error(s);
-                let weight = 1.0 / (error * error);
-                (0..3).for_each(|k| sum[k] += weight * self.store.rgb[k][i]);
-                weights += weight;
-            }
-        });
-        sum.map(|c| c / weights)
-    }
-
-    /// The samples within `reach` cells around a pixel, or those exactly so far.
-    fn ring(&self, x: i32, y: i32, reach: i32, border: bool, mut visit: impl FnMut(usize)) {
-        let layout = &self.store.layout;
-        let n = layout.per_side as i32;
-        let (columns, rows) = (layout.size.width as i32 * n, layout.size.height as i32 * n);
-        for cy in (y * n - reach).max(0)..((y + 1) * n + reach).min(rows) {
-            for cx in (x * n - reach).max(0)..((x + 1) * n + reach).min(columns) {
-                let far = cx == x * n - reach
-                    || cy == y * n - reach
-                    || cx + 1 == (x + 1) * n + reach
-                    || cy + 1 == (y + 1) * n + reach;
-                let i = layout.neighbour(0, 0, cx, cy);
-                if (far || !border) && !self.store.is_empty(i) {
-                    visit(i);
-                }
-            }
-        }
     }
 }
 

@@ -6,6 +6,7 @@
 //! land on pixel centres at the next refresh ([`aim`]).
 
 mod aim;
+mod fill;
 mod gather;
 mod holes;
 mod residual;
@@ -120,11 +121,9 @@ impl Reconstruction for Reproject {
         canvas.update(refresh.now, &mut self.holes, |pixel| {
             let (x, y) = size.xy(pixel as u32);
             let is_known = !gather.holes()[pixel].is_unknown();
-            let tick = match store.newest(x, y) {
-                Some(newest) => Tick(store.tick[newest]),
-                None => gather.tick_of_hole(pixel),
-            };
-            (tick.time(refresh.now), is_known)
+            let (x, y) = gather.source(pixel).map_or((x, y), |source| size.xy(source));
+            let newest = store.newest(x, y).map(|i| Tick(store.tick[i]).time(refresh.now));
+            (newest.unwrap_or(Time::ZERO), is_known)
         });
     }
 }
