@@ -153,3 +153,35 @@ fn complaint(message: &Value) -> Option<String> {
     };
     is_error.then(|| params.to_string())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pages_that_complain_or_hide_something_are_refused() {
+        let Some(program) = crate::missing::browser() else {
+            assert!(std::env::var_os("CI").is_none(), "no browser to test the test of the report");
+            eprintln!("SKIPPED: there is no browser to open pages with");
+            return;
+        };
+        let folder = std::env::temp_dir().join(format!("frameless-pages-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("writable");
+        for (page, words) in [
+            ("<script>console.error('alas')</script>", "alas"),
+            ("<script>nobody.knows()</script>", "ReferenceError"),
+            ("<img src='https://example.invalid/a.png'>", "example.invalid"),
+            ("<div data-scene=many></div>", "wanted the scenes"),
+            (
+                "<div data-scene=sphere>without a chart</div><video></video>",
+                "looking at the page failed",
+            ),
+        ] {
+            let file = folder.join("page.html");
+            std::fs::write(&file, format!("<!doctype html><h1>page</h1>{page}")).expect("writable");
+            let complaint = opens(program, &file, &["sphere"]).expect_err(page).to_string();
+            assert!(complaint.contains(words), "{page}: {complaint}");
+        }
+        std::fs::remove_dir_all(folder).expect("removable");
+    }
+}
