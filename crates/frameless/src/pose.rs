@@ -47,9 +47,8 @@ impl Projection {
     /// Where the point is in the picture; `None` behind the camera.
     #[inline]
     pub fn project(&self, point: [f32; 3]) -> Option<Projected> {
-        let [column, row, depth, w] = self
-            .0
-            .map(|r| r[0].mul_add(point[0], r[1].mul_add(point[1], r[2].mul_add(point[2], r[3]))));
+        let [x, y, z] = point;
+        let [column, row, depth, w] = self.0.map(|r| r[0] * x + r[1] * y + (r[2] * z + r[3]));
         let per_w = 1.0 / w;
         (w > 0.0).then_some(Projected { px: [column * per_w, row * per_w], depth })
     }
