@@ -1,5 +1,6 @@
 //! Project chores; `cargo xtask help` lists them.
 
+mod browser;
 mod command;
 mod missing;
 mod picture;
@@ -16,8 +17,9 @@ const HELP: &str = "\
 Project chores. Run them from anywhere in the checkout:
 
   cargo xtask test           everything that CI checks: formatting, clippy, all tests, the program as a
-                             user runs it, a small comparison with its video, and the window
+                             user runs it, a small comparison with its video and report, and the window
   cargo xtask smoke-window   only the window: opens it on a virtual screen and looks at a screenshot
+  cargo xtask smoke-report   only a small comparison: nothing got worse, and its report opens in a browser
   cargo xtask help           this text
 
 What is missing on this machine is named together with the way to install it, and the checks that need it
@@ -30,6 +32,7 @@ fn main() -> ExitCode {
     let passed = match chore.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
         ["test"] => test::everything(),
         ["smoke-window"] => test::only_window(),
+        ["smoke-report"] => test::only_report(),
         [] | ["help" | "--help" | "-h"] => {
             println!("{HELP}");
             true

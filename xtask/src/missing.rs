@@ -81,6 +81,20 @@ pub(crate) fn to_read_a_video() -> Vec<Missing> {
     vec![debian("ffprobe", "it reads the comparison's video", "ffmpeg")]
 }
 
+/// Needed to open the report.
+pub(crate) fn to_open_a_report() -> Vec<Missing> {
+    if browser().is_some() {
+        return Vec::new();
+    }
+    vec![debian("Chromium", "the report is opened in a browser", "chromium")]
+}
+
+/// The browser's name, if there is one.
+pub(crate) fn browser() -> Option<&'static str> {
+    let names = ["chromium", "chromium-browser", "google-chrome"];
+    names.into_iter().find(|name| runs(name, &["--version"]))
+}
+
 fn debian(what: &'static str, purpose: &'static str, package: &str) -> Missing {
     Missing { what, purpose, install: format!("apt-get install {package}") }
 }

@@ -57,8 +57,10 @@ pub(crate) fn a_comparison(program: &Path, out: &Path) -> Result<Done> {
     for algorithm in ["\"random\"", "\"change\""] {
         ensure!(results.contains(algorithm), "results.json does not know {algorithm}");
     }
-    ensure!(!files(&out, "svg")?.is_empty(), "the comparison drew no curves");
-    for still in files(&out, "png")? {
+    not_worse(program, &out.join("results.json"))?;
+    let pictures = out.join("pictures");
+    ensure!(!files(&pictures, "svg")?.is_empty(), "the comparison drew no curves");
+    for still in files(&pictures, "png")? {
         picture::shows_something(&still)?;
     }
     let missing = missing::to_read_a_video();
@@ -66,12 +68,29 @@ pub(crate) fn a_comparison(program: &Path, out: &Path) -> Result<Done> {
         let skipped = vec![format!("the comparison's video: {missing}")];
         return Ok(Done { skipped, ..Done::passed("") });
     }
-    let videos = files(&out, "mp4")?;
-    ensure!(videos.len() == 1, "wanted one video, got {}", videos.len());
+    let videos = files(&pictures, "mp4")?;
+    let wanted = COMPARED_SCENES.len();
+    ensure!(videos.len() == wanted, "wanted {wanted} videos, got {}", videos.len());
     let frames = frames_of(&videos[0])?;
     ensure!(frames == VIDEO_FRAMES, "the video has {frames} frames, not {VIDEO_FRAMES}");
-    Ok(Done::passed(format!("{frames} frames of video")))
+    Ok(Done::passed(format!("no error grew; {frames} frames of video")))
 }
+
+/// Against the results in the repository: nothing may have got worse. When it did so on purpose, copy the new results there and
+/// say so under "Results change" in the changelog.
+fn not_worse(program: &Path, results: &Path) -> Result<()> {
+    let kept = crate::project_dir().join("xtask/smoke.json");
+    let (kept, results) = (kept.to_string_lossy(), results.to_string_lossy());
+    let answer = answer(program, &["compare", &kept, &results], LIMIT)?;
+    let table = String::from_utf8_lossy(&answer.stdout);
+    eprint!("{table}");
+    succeeded(&answer)?;
+    ensure!(!table.contains("only in"), "xtask/smoke.json is of another experiment");
+    Ok(())
+}
+
+/// What xtask/smoke.toml looks at.
+pub(crate) const COMPARED_SCENES: [&str; 2] = ["sphere", "shadow"];
 
 /// Half a second at 60 Hz.
 const VIDEO_FRAMES: usize = 30;

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 
+use crate::browser;
 use crate::command::{cargo, run, watch};
 use crate::missing::{self, Missing};
 use crate::program;
@@ -21,6 +22,7 @@ pub(crate) fn everything() -> bool {
     steps.step("build the program", || build().map(|_| Done::passed("")));
     steps.step("the program", || program::as_a_user(&program()?, &out_dir("program")?));
     steps.step("a comparison", || program::a_comparison(&program()?, &out_dir("comparison")?));
+    steps.step("the report in a browser", open_report);
     steps.step("the window", || open_window(&program()?));
     steps.finish()
 }
@@ -29,6 +31,14 @@ pub(crate) fn everything() -> bool {
 pub(crate) fn only_window() -> bool {
     let mut steps = Steps::new(in_ci());
     steps.step("the window", || open_window(&build()?));
+    steps.finish()
+}
+
+/// Only a small comparison and its report. True if nothing failed.
+pub(crate) fn only_report() -> bool {
+    let mut steps = Steps::new(in_ci());
+    steps.step("a comparison", || program::a_comparison(&build()?, &out_dir("comparison")?));
+    steps.step("the report in a browser", open_report);
     steps.finish()
 }
 
@@ -41,6 +51,7 @@ fn prerequisites() -> Result<Done> {
     let to_build = missing::to_build();
     let mut later = missing::to_open_a_window();
     later.extend(missing::to_read_a_video());
+    later.extend(missing::to_open_a_report());
     for missing in &later {
         eprintln!("note: {missing}");
     }
@@ -99,17 +110,32 @@ fn open_window(program: &Path) -> Result<Done> {
     Ok(Done::passed(window::smoke(program, &out_dir("window")?)?))
 }
 
+/// The report of the comparison that was made before.
+fn open_report() -> Result<Done> {
+    let Some(browser) = missing::browser() else {
+        let missing = lines(&missing::to_open_a_report());
+        return Ok(Done::skipped(format!("the report in a browser: {missing}")));
+    };
+    let report = dir_of("comparison")?.join("smoke/report.html");
+    Ok(Done::passed(browser::opens(browser, &report, &program::COMPARED_SCENES)?))
+}
+
 /// An empty folder beside the build's other outputs; what a check wrote stays there to be looked at.
 fn out_dir(name: &str) -> Result<PathBuf> {
-    let program = std::env::current_exe()?;
-    let target =
-        program.parent().and_then(Path::parent).context("xtask lies in no build folder")?;
-    let dir = target.join("xtask").join(name);
+    let dir = dir_of(name)?;
     if dir.exists() {
         std::fs::remove_dir_all(&dir).with_context(|| format!("cannot empty {}", dir.display()))?;
     }
     std::fs::create_dir_all(&dir).with_context(|| format!("cannot make {}", dir.display()))?;
     Ok(dir)
+}
+
+/// A folder beside the build's other outputs.
+fn dir_of(name: &str) -> Result<PathBuf> {
+    let program = std::env::current_exe()?;
+    let target =
+        program.parent().and_then(Path::parent).context("xtask lies in no build folder")?;
+    Ok(target.join("xtask").join(name))
 }
 
 fn lines(missing: &[Missing]) -> String {

@@ -95,8 +95,8 @@ fn what_was_finished_is_kept_and_the_outcome_is_the_same() {
 
     let out = parent.path().join("in parts");
     let mut kept_before = 0;
-    for part in 1..6 {
-        let watch = Watch { limit: Some(all_work * part / 20), ..Watch::default() };
+    for part in 1..4 {
+        let watch = Watch { limit: Some(all_work * part / 12), ..Watch::default() };
         match compare(&experiment(SMALL), &out, &watch) {
             Err(error @ EvalError::Unfinished { kept, wanted, .. }) => {
                 assert!(kept >= kept_before && kept < wanted && wanted == RUNS, "{error}");

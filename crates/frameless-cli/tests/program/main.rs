@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod bad_scenes;
+mod compare;
 mod good_input;
 mod help;
 mod run;

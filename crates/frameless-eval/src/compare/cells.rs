@@ -7,8 +7,8 @@ use crate::experiment::{Experiment, SceneSpec};
 use crate::results::RESULTS_VERSION;
 use crate::run::Cell;
 
-/// Increased whenever a tracer, an algorithm or a metric gives other results for the same input: cells of other versions
-/// are not used again.
+/// Increased whenever a tracer, an algorithm, a metric or the way pictures are made gives other results for the same input:
+/// cells of other versions are not used again.
 const CODE_VERSION: u32 = 1;
 
 /// The runs of a scene: rates, algorithms, seeds, in this order. What is not random runs with the first seed only.

@@ -53,11 +53,12 @@ impl<'a> Factors<'a> {
 
     /// How much work the scans of a scene will probably be.
     pub(super) fn guessed_cost(experiment: &Experiment) -> u64 {
-        let cost = |rate: f64| {
-            cost::refresh(experiment, rate, Depth::OnlyRmse) * experiment.refreshes as u64
-        };
         let of_one = |comparison: &Comparison| -> u64 {
-            GUESSED_FACTORS.iter().map(|factor| cost(factor * comparison.samples_per_sec)).sum()
+            let cost = |factor: &f64| {
+                let rate = factor * comparison.samples_per_sec;
+                cost::refresh(experiment, comparison.opponent, rate, Depth::OnlyRmse)
+            };
+            GUESSED_FACTORS.iter().map(cost).sum::<u64>() * experiment.refreshes as u64
         };
         comparisons(experiment).iter().map(of_one).sum()
     }

@@ -1,6 +1,8 @@
 //! What a scene is, as a short text that changes when the scene does.
 
+use std::collections::BTreeMap;
 use std::path::{Component, Path};
+use std::sync::Mutex;
 
 use percent_encoding::percent_decode_str;
 use serde_json::Value;
@@ -15,31 +17,41 @@ use crate::experiment::SceneSource;
 /// # Errors
 /// If the file cannot be read.
 pub(super) fn fingerprint(source: &SceneSource) -> Result<String, EvalError> {
-    let mut hash = Sha256::new();
     match source {
         SceneSource::Builtin(name) => {
-            let mut scene =
-                frameless_scene::builtin(name).expect("checked when the experiment was read");
-            // Millions of texels would make a long text.
-            for image in std::mem::take(&mut scene.images) {
-                hash.update(format!("{}x{}\n", image.width, image.height));
-                hash.update(image.rgba.as_flattened());
-            }
-            hash.update(format!("{scene:?}"));
+            // They do not change while the program runs, and take longer to make than small runs take.
+            static KNOWN: Mutex<BTreeMap<String, String>> = Mutex::new(BTreeMap::new());
+            let mut known = KNOWN.lock().expect("nobody panics while they are made");
+            Ok(known.entry(name.clone()).or_insert_with(|| of_builtin(name)).clone())
         }
-        SceneSource::File(path) => {
-            let bytes = std::fs::read(path)
-                .map_err(|source| EvalError::Unreadable { path: path.clone(), source })?;
-            let folder = path.parent().unwrap_or(Path::new(""));
-            for uri in named_files(&bytes) {
-                // What cannot be read is refused, and said so, when the scene is loaded.
-                let named = read_below(folder, &uri).unwrap_or_default();
-                hash.update(format!("{uri} {}\n", named.len()));
-                hash.update(named);
-            }
-            hash.update(bytes);
-        }
+        SceneSource::File(path) => of_file(path),
     }
+}
+
+fn of_builtin(name: &str) -> String {
+    let mut hash = Sha256::new();
+    let mut scene = frameless_scene::builtin(name).expect("checked when the experiment was read");
+    // Millions of texels would make a long text.
+    for image in std::mem::take(&mut scene.images) {
+        hash.update(format!("{}x{}\n", image.width, image.height));
+        hash.update(image.rgba.as_flattened());
+    }
+    hash.update(format!("{scene:?}"));
+    hex(&hash.finalize())
+}
+
+fn of_file(path: &Path) -> Result<String, EvalError> {
+    let mut hash = Sha256::new();
+    let bytes = std::fs::read(path)
+        .map_err(|source| EvalError::Unreadable { path: path.to_path_buf(), source })?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    for uri in named_files(&bytes) {
+        // What cannot be read is refused, and said so, when the scene is loaded.
+        let named = read_below(folder, &uri).unwrap_or_default();
+        hash.update(format!("{uri} {}\n", named.len()));
+        hash.update(named);
+    }
+    hash.update(bytes);
     Ok(hex(&hash.finalize()))
 }
 

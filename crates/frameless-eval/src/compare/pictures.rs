@@ -53,9 +53,11 @@ pub(super) fn key(experiment: &Experiment, scene: &SceneKey) -> Key {
 
 /// The work of making them.
 pub(super) fn cost(experiment: &Experiment) -> u64 {
-    let refreshes: usize =
-        experiment.algorithms.iter().map(|algorithm| end(experiment, algorithm)).sum();
-    refreshes as u64 * cost::pictured_refresh(experiment, pictured_rate(experiment))
+    let of_one = |algorithm: &Algorithm| {
+        let refresh = cost::pictured_refresh(experiment, algorithm, pictured_rate(experiment));
+        end(experiment, algorithm) as u64 * refresh
+    };
+    experiment.algorithms.iter().map(of_one).sum()
 }
 
 /// After this many refreshes nobody wants a picture of `algorithm` any more.
@@ -101,12 +103,17 @@ pub(super) fn make(
                 return Err(EvalError::Interrupted);
             }
             let mut pictures = Vec::with_capacity(players.len());
-            for (end, player) in &players {
-                // A player that has ended without a word has panicked, which the scope passes on.
-                let picture = if k < *end { player.recv().ok().transpose()? } else { None };
-                pictures.push(picture);
+            for (algorithm, (end, player)) in experiment.algorithms.iter().zip(&players) {
                 if k < *end {
-                    work.advance(cost::pictured_refresh(experiment, arena.samples_per_sec));
+                    // A player that has ended without a word has panicked, which the scope passes on.
+                    pictures.push(player.recv().ok().transpose()?);
+                    work.advance(cost::pictured_refresh(
+                        experiment,
+                        algorithm,
+                        arena.samples_per_sec,
+                    ));
+                } else {
+                    pictures.push(None);
                 }
             }
             album.add(k, &rgb8(&ideals.pictures[k]), &pictures)?;

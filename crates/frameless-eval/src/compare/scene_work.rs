@@ -129,7 +129,7 @@ impl<'a> SceneWork<'a> {
     }
 
     fn cost(&self, cell: &Cell, depth: Depth) -> u64 {
-        let refresh = cost::refresh(self.experiment, cell.samples_per_sec, depth);
+        let refresh = cost::refresh(self.experiment, &cell.algorithm, cell.samples_per_sec, depth);
         refresh * self.experiment.refreshes as u64
     }
 
@@ -180,7 +180,7 @@ impl<'a> SceneWork<'a> {
         ideals: &Ideals,
         work: &Work,
     ) -> Result<RunResult, EvalError> {
-        let cost = cost::refresh(self.experiment, cell.samples_per_sec, depth);
+        let cost = cost::refresh(self.experiment, &cell.algorithm, cell.samples_per_sec, depth);
         let mut go_on = |_: usize, _: &_| {
             work.advance(cost);
             !work.should_stop()

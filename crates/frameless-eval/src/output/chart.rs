@@ -101,13 +101,15 @@ impl Chart {
                     title { "not scored" }
                 }
             }
-            @for (secs, name) in &self.events {
+            @for (i, (secs, name)) in self.events.iter().enumerate() {
+                // Names of events that follow each other closely stand below each other.
+                @let y = top + 10.0 + 14.0 * (i % 3) as f64;
                 line.event x1=(self.x(*secs)) x2=(self.x(*secs)) y1=(top) y2=(bottom) {}
                 // Beside its line, on the side where there is room.
                 @if self.x(*secs) > (left + right) / 2.0 {
-                    text x=(self.x(*secs) - 4.0) y=(top + 10.0) text-anchor="end" { (name) }
+                    text x=(self.x(*secs) - 4.0) y=(y) text-anchor="end" { (name) }
                 } @else {
-                    text x=(self.x(*secs) + 4.0) y=(top + 10.0) { (name) }
+                    text x=(self.x(*secs) + 4.0) y=(y) { (name) }
                 }
             }
         }

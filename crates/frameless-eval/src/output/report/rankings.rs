@@ -30,14 +30,13 @@ pub(super) fn section(results: &Results) -> Markup {
 
 fn table(ranking: &Ranking, metric: Metric) -> Markup {
     let mean = if metric.is_mean_geometric() { "geometric mean" } else { "mean" };
-    let columns: Vec<Vec<Option<f64>>> =
-        std::iter::once(ranking.rows.iter().map(|r| r.mean).collect())
-            .chain(
-                (0..ranking.scenes.len())
-                    .map(|i| ranking.rows.iter().map(|r| r.by_scene[i]).collect()),
-            )
-            .collect();
-    let scales: Vec<Scale> = columns.iter().map(|values| Scale::of(values, metric)).collect();
+    let scale_of = |value: &dyn Fn(&RankingRow) -> Option<f64>| {
+        let competitors = ranking.rows.iter().filter(|row| !is_reference(row));
+        Scale::of(&competitors.map(value).collect::<Vec<_>>(), metric)
+    };
+    let mean_scale = scale_of(&|row| row.mean);
+    let scales: Vec<Scale> =
+        (0..ranking.scenes.len()).map(|i| scale_of(&|row| row.by_scene[i])).collect();
     html! {
         table.sortable.numbers {
             thead {
@@ -51,8 +50,8 @@ fn table(ranking: &Ranking, metric: Metric) -> Markup {
                 @for row in &ranking.rows {
                     tr.reference[is_reference(row)] {
                         th.name scope="row" { (row.algorithm) }
-                        (cell(row.mean, &scales[0], metric))
-                        @for (value, scale) in row.by_scene.iter().zip(&scales[1..]) {
+                        (cell(row.mean, &mean_scale, metric))
+                        @for (value, scale) in row.by_scene.iter().zip(&scales) {
                             (cell(*value, scale, metric))
                         }
                     }
@@ -76,7 +75,7 @@ fn cell(value: Option<f64>, scale: &Scale, metric: Metric) -> Markup {
     }
 }
 
-/// From the worst of a column to its best.
+/// From the worst competitor of a column to the best.
 struct Scale {
     best: f64,
     worst: f64,
@@ -94,8 +93,11 @@ impl Scale {
         }
     }
 
-    /// 0 for the worst, 1 for the best; 1 where all are equal.
+    /// 0 for the worst, 1 for the best and for a reference that is better; 1 where all are equal.
     fn share(&self, value: f64) -> f64 {
-        if self.best == self.worst { 1.0 } else { (value - self.worst) / (self.best - self.worst) }
+        if self.best == self.worst {
+            return 1.0;
+        }
+        ((value - self.worst) / (self.best - self.worst)).clamp(0.0, 1.0)
     }
 }
