@@ -66,7 +66,7 @@ pub(crate) struct ViewArgs {
     #[arg(default_value = DEFAULT_SCENE)]
     pub(crate) scene: String,
 
-    /// Who chooses the pixels: random, permutation or change
+    /// Who chooses the pixels: random, permutation, change or adaptive
     #[arg(long, value_name = "NAME", value_parser = sampler_names())]
     pub(crate) sampler: Option<String>,
 

@@ -1,10 +1,10 @@
 //! Who competes, by name.
 
-use frameless::{ReconstructionKind, SamplerKind};
+use frameless::{ReconstructionKind, SamplerKind, Size};
 
 use crate::contender::{Arena, Contender};
 use crate::contenders::{
-    Framed, FramedSingle, Frameless, LowRes, OracleHold, Progressive, Temporal,
+    Blind, Framed, FramedSingle, Frameless, LowRes, OracleHold, Progressive, Temporal,
 };
 
 /// A way of making pictures from samples.
@@ -99,9 +99,25 @@ impl Algorithm {
         }
     }
 
+    /// Another algorithm that shows exactly the same at this rate, if there is one; else this. Where a refresh has time for a
+    /// whole picture, low resolution and temporal upsampling are plain frames.
+    pub(crate) fn same_at(&self, size: Size, display_hz: u32, samples_per_sec: f64) -> Algorithm {
+        let is_whole = samples_per_sec / f64::from(display_hz) >= size.pixels() as f64;
+        match self {
+            Algorithm::LowRes { refreshes_per_frame: 1 } | Algorithm::Temporal if is_whole => {
+                Algorithm::Framed
+            }
+            other => other.clone(),
+        }
+    }
+
     /// The algorithm at work, at time 0.
     pub(crate) fn contender<'a>(&self, arena: Arena<'a>) -> Box<dyn Contender + 'a> {
         match *self {
+            Algorithm::Frameless(
+                kind @ (SamplerKind::Random | SamplerKind::Permutation),
+                ReconstructionKind::Hold,
+            ) => Box::new(Blind::new(arena, kind.build(arena.seed))),
             Algorithm::Frameless(kind, reconstruction) => {
                 Box::new(Frameless::new(arena, kind.build(arena.seed), reconstruction))
             }

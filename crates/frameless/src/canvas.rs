@@ -11,7 +11,7 @@ pub struct Canvas {
     time: Vec<Time>,
     known: Vec<bool>,
     holes: Vec<u32>,
-    holes_found: u64,
+    updates: u64,
     holes_at: Time,
 }
 
@@ -21,7 +21,7 @@ impl Canvas {
         let mut canvas = Canvas::from_picture(size, vec![[0.0; 3]; size.pixels()]);
         canvas.known.fill(false);
         canvas.holes = coarse_to_fine(size);
-        canvas.holes_found = 1;
+        canvas.updates = 1;
         canvas
     }
 
@@ -38,7 +38,7 @@ impl Canvas {
             time: vec![Time::ZERO; size.pixels()],
             known: vec![true; size.pixels()],
             holes: Vec::new(),
-            holes_found: 0,
+            updates: 0,
             holes_at: Time::ZERO,
         }
     }
@@ -81,9 +81,10 @@ impl Canvas {
         !self.known[pixel as usize] || self.time[pixel as usize] <= self.holes_at
     }
 
-    /// How often [`Canvas::holes`] has been made anew.
-    pub fn holes_found(&self) -> u64 {
-        self.holes_found
+    /// How often a reconstruction has said anew what the pixels show: then all of [`Canvas::time`], [`Canvas::known`] and
+    /// [`Canvas::holes`] may have changed without a sample.
+    pub fn updates(&self) -> u64 {
+        self.updates
     }
 
     /// What every pixel shows has been found out anew: when it was traced, and where nothing is known.
@@ -98,7 +99,7 @@ impl Canvas {
             (*time, *known) = state(pixel);
         }
         std::mem::swap(&mut self.holes, holes);
-        self.holes_found += 1;
+        self.updates += 1;
     }
 
     /// Write a sample; returns the time and colour that it replaces.
@@ -133,7 +134,7 @@ impl Canvas {
             time: source.iter().map(|&i| self.time[i]).collect(),
             known: source.iter().map(|&i| self.known[i]).collect(),
             holes: coarse_to_fine(size),
-            holes_found: self.holes_found + 1,
+            updates: self.updates + 1,
             holes_at: self.holes_at,
         }
     }

@@ -71,3 +71,25 @@ impl Rates {
         self.rate[self.grid.tile_of(pixel)]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Size, Time};
+
+    #[test]
+    fn a_steady_change_is_learned_and_forgotten() {
+        let mut rates = Rates::new(TileGrid::new(Size::new(8, 8), 8));
+        let mut observe = |change: f32| {
+            let (now, previous) = (Time::from_secs(1.0), Time::from_secs(0.9));
+            let observed = Observation { pixel: 0, now, previous, known: true, change };
+            rates.observe(0, &observed, 1.0);
+            rates.of_pixel(63)
+        };
+        // Σ d/3 over Σ age: 0.01 per 0.1 s.
+        let learned = (0..200).map(|_| observe(0.03)).last().expect("a rate");
+        assert!((learned - 0.1).abs() < 1e-3, "{learned}");
+        let after_eight = (0..8).map(|_| observe(0.0)).last().expect("a rate");
+        assert!((after_eight / learned - 0.92f32.powi(8)).abs() < 0.01, "{after_eight}");
+    }
+}

@@ -12,6 +12,7 @@ use crate::run::Cell;
 
 /// The comparisons that an experiment asks for, and the errors known so far.
 pub(super) struct Factors<'a> {
+    experiment: &'a Experiment,
     scene: &'a str,
     /// Scans run with the first seed only.
     seed: u64,
@@ -40,6 +41,7 @@ impl<'a> Factors<'a> {
         runs: &[RunResult],
     ) -> Factors<'a> {
         let mut factors = Factors {
+            experiment,
             scene: &spec.name,
             seed: experiment.seeds[0],
             comparisons: comparisons(experiment),
@@ -75,13 +77,14 @@ impl<'a> Factors<'a> {
                 },
             };
             let Some((algorithm, samples_per_sec)) = wanted else { continue };
+            let algorithm = self.same(algorithm, samples_per_sec);
             let is_there = |cell: &Cell| {
-                cell.algorithm == *algorithm && cell.samples_per_sec == samples_per_sec
+                cell.algorithm == algorithm && cell.samples_per_sec == samples_per_sec
             };
             if !cells.iter().any(is_there) {
                 cells.push(Cell {
                     scene: self.scene.into(),
-                    algorithm: algorithm.clone(),
+                    algorithm,
                     samples_per_sec,
                     seed: self.seed,
                 });
@@ -128,7 +131,16 @@ impl<'a> Factors<'a> {
     }
 
     fn error(&self, algorithm: &Algorithm, samples_per_sec: f64) -> Option<f64> {
-        self.errors.get(&(algorithm.name(), samples_per_sec.to_bits())).copied()
+        let of = |algorithm: &Algorithm| {
+            self.errors.get(&(algorithm.name(), samples_per_sec.to_bits())).copied()
+        };
+        of(algorithm).or_else(|| of(&self.same(algorithm, samples_per_sec)))
+    }
+
+    /// Who is run for `algorithm` at a rate: one run for all that show the same.
+    fn same(&self, algorithm: &Algorithm, samples_per_sec: f64) -> Algorithm {
+        let Experiment { size, display_hz, .. } = self.experiment;
+        algorithm.same_at(*size, *display_hz, samples_per_sec)
     }
 }
 

@@ -1,5 +1,6 @@
 //! The contenders, one file each: frameless ones and the strongest of what is used instead.
 
+mod blind;
 mod framed;
 mod framed_single;
 mod frameless;
@@ -8,6 +9,7 @@ mod oracle_hold;
 mod progressive;
 mod temporal;
 
+pub(crate) use blind::Blind;
 pub(crate) use framed::Framed;
 pub(crate) use framed_single::FramedSingle;
 pub(crate) use frameless::Frameless;

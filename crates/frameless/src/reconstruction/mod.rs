@@ -57,14 +57,13 @@ pub trait Reconstruction: Send {
 }
 
 /// The reconstructions that come with the crate.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReconstructionKind {
     /// [`Hold`].
     Hold,
     /// [`Filter`].
     Filter,
     /// [`Reproject`].
-    #[default]
     Reproject,
     /// [`Reproject`] with 2×2 cells per pixel.
     Deep,

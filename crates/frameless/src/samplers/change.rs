@@ -40,6 +40,7 @@ pub struct Change {
 /// What is known of one canvas.
 struct Known {
     generation: u32,
+    updates: u64,
     sums: Sums,
     pdf: TilePdf,
 }
@@ -59,7 +60,16 @@ impl Known {
 
     fn from_scratch(canvas: &Canvas, tile: u32) -> Known {
         let sums = Sums::from_scratch(canvas, tile, &[]);
-        Known { generation: canvas.generation(), pdf: TilePdf::new(&sums.grid), sums }
+        let pdf = TilePdf::new(&sums.grid);
+        Known { generation: canvas.generation(), updates: canvas.updates(), pdf, sums }
+    }
+
+    /// Ages have changed without a sample; what each pixel's last sample changed has not.
+    fn update(&mut self, canvas: &Canvas) {
+        if self.updates != canvas.updates() {
+            self.updates = canvas.updates();
+            self.sums = Sums::from_scratch(canvas, self.sums.grid.side, &self.sums.change);
+        }
     }
 }
 
@@ -69,6 +79,7 @@ impl Sampler for Change {
             self.known = None;
         }
         let known = self.known.get_or_insert_with(|| Known::from_scratch(canvas, self.tile));
+        known.update(canvas);
         known.sums.tile_probability(now, self.w_d, &mut known.pdf.probability);
         known.pdf.draw(&mut self.rng, count, requests);
     }

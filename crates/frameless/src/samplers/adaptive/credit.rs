@@ -28,6 +28,13 @@ pub(crate) struct Credit {
     order: Vec<(u32, u32)>,
 }
 
+/// The part of the samples that each tile gets, of those that holes and fronts leave.
+pub(crate) fn shares(rates: &[f32]) -> Vec<f32> {
+    let sum: f32 = rates.iter().map(|rate| (rate + LEAST_RATE).sqrt()).sum();
+    let evenly = EVENLY / rates.len() as f32;
+    rates.iter().map(|rate| (1.0 - EVENLY) * (rate + LEAST_RATE).sqrt() / sum + evenly).collect()
+}
+
 impl Credit {
     pub(crate) fn new(tiles: usize, side_bits: u32, rng: &mut Rng) -> Credit {
         Credit {

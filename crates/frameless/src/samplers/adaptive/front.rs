@@ -63,3 +63,36 @@ impl Front {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(pixel: u32, now: Time, change: f32) -> Observation {
+        Observation { pixel, now, previous: Time::ZERO, known: true, change }
+    }
+
+    #[test]
+    fn the_neighbours_of_a_change_are_next_unless_they_are_fresh() {
+        let size = Size::new(4, 3);
+        let mut canvas = Canvas::from_picture(size, vec![[0.0; 3]; 12]);
+        let mut front = Front::new(size);
+        let now = Time::from_secs(1.0);
+        canvas.replace(1, Time::from_secs(0.995), [0.0; 3]);
+        front.observe(&found(0, now, 0.1), &canvas);
+        let queued: Vec<u32> = std::iter::from_fn(|| front.next(&canvas)).collect();
+        assert_eq!(queued, [4, 5], "1 is 5 ms old, and the corner has no other");
+        front.observe(&found(0, now, 0.001), &canvas);
+        assert_eq!(front.next(&canvas), None, "too small a change");
+    }
+
+    #[test]
+    fn who_was_traced_since_is_left_out() {
+        let size = Size::new(3, 1);
+        let mut canvas = Canvas::from_picture(size, vec![[0.0; 3]; 3]);
+        let mut front = Front::new(size);
+        front.observe(&found(1, Time::from_secs(1.0), 0.1), &canvas);
+        canvas.replace(0, Time::from_secs(1.0), [0.0; 3]);
+        assert_eq!((front.next(&canvas), front.next(&canvas)), (Some(2), None));
+    }
+}
