@@ -5,7 +5,7 @@ use crate::results::{Results, RunResult};
 /// Two results side by side.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
-    /// What is in both, in the first one's order.
+    /// What was measured in the first and can be looked for in the second, in the first one's order.
     pub rows: Vec<DifferenceRow>,
     /// What is only in the first.
     pub only_in_a: Vec<RunGroup>,
@@ -26,56 +26,127 @@ pub struct RunGroup {
     pub display: (u32, u32, u32, usize, usize),
 }
 
-/// One group in both results.
+/// One value of one group in both results.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DifferenceRow {
     /// Which runs.
     pub group: RunGroup,
-    /// Mean RMSE in the first result, mean over the seeds.
-    pub a: f64,
+    /// What was measured.
+    pub measure: Measure,
+    /// The value in the first result, mean over the seeds; `None` if a seed has none.
+    pub a: Option<f64>,
     /// The same in the second.
-    pub b: f64,
-    /// Largest less smallest mean RMSE over the seeds, of the result in which that is larger; 0 with a single seed.
+    pub b: Option<f64>,
+    /// Largest less smallest value over the seeds of the first result; 0 with a single seed. What the second one's seeds do
+    /// must not excuse it.
     pub spread: f64,
 }
 
-/// Whether an error moved by more than chance moves it.
+/// What is compared of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Measure {
+    /// Mean RMSE.
+    Rmse,
+    /// 95th percentile of the RMSE.
+    RmseP95,
+    /// Mean RMSE over the changed region.
+    RmseChanged,
+    /// Mean SSIM.
+    Ssim,
+    /// Mean FLIP.
+    Flip,
+    /// RMSE against 64 samples per pixel at the end of the run, where it ends at rest.
+    AtRest,
+    /// Latency of the event of this name, in seconds.
+    Latency(String),
+}
+
+/// Whether a value moved by more than chance moves it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// The error fell by more than the spread.
+    /// By more than the tolerance to the good, or there is a value where there was none.
     Better,
-    /// It did not move by more than the spread.
+    /// It did not move by more than the tolerance.
     Same,
-    /// It rose by more than the spread.
+    /// By more than the tolerance to the bad, or there is no value any more.
     Worse,
 }
 
-/// Changes of less than this part of the error are none, whatever the spread: what is not random has no spread, and another
+/// Changes of less than this part of the value are none, whatever the spread: what is not random has no spread, and another
 /// machine's sine may put a pixel at an edge on the other side.
 const NO_CHANGE: f64 = 0.005;
 
 /// Nor are differences below this; a tenth of the smallest step of an 8-bit display, over the whole picture.
 const NO_ERROR: f64 = 0.0004;
 
+impl Measure {
+    /// As people call it.
+    pub fn name(&self) -> String {
+        match self {
+            Measure::Rmse => "RMSE".into(),
+            Measure::RmseP95 => "95th percentile of RMSE".into(),
+            Measure::RmseChanged => "RMSE of changed region".into(),
+            Measure::Ssim => "SSIM".into(),
+            Measure::Flip => "FLIP".into(),
+            Measure::AtRest => "RMSE at rest".into(),
+            Measure::Latency(event) => format!("latency of {event}, s"),
+        }
+    }
+
+    fn of(&self, run: &RunResult) -> Option<f64> {
+        match self {
+            Measure::Rmse => run.rmse.mean,
+            Measure::RmseP95 => run.rmse.p95,
+            Measure::RmseChanged => run.rmse_changed.mean,
+            Measure::Ssim => run.ssim.mean,
+            Measure::Flip => run.flip.mean,
+            Measure::AtRest => run.at_rest.as_ref()?.rmse.last().copied(),
+            Measure::Latency(name) => {
+                run.events.iter().find(|event| event.name == *name)?.latency_secs
+            }
+        }
+    }
+
+    /// Everything that is measured of a run.
+    fn all_of(run: &RunResult) -> Vec<Measure> {
+        use Measure::{AtRest, Flip, Rmse, RmseChanged, RmseP95, Ssim};
+        let mut all = vec![Rmse, RmseP95, RmseChanged, Ssim, Flip, AtRest];
+        all.extend(run.events.iter().map(|event| Measure::Latency(event.name.clone())));
+        all
+    }
+
+    /// The smallest difference that counts.
+    fn least(&self, group: &RunGroup) -> f64 {
+        match self {
+            // Refreshes come at times rounded to nanoseconds.
+            Measure::Latency(_) => 0.5 / f64::from(group.display.2),
+            _ => NO_ERROR,
+        }
+    }
+}
+
 impl DifferenceRow {
-    /// b / a; infinite if an error appeared where there was none, 1 if there is none in either.
-    pub fn ratio(&self) -> f64 {
-        if self.a == self.b { 1.0 } else { self.b / self.a }
-    }
-
-    /// Larger changes than this are called better or worse: the spread over the seeds, but at least 0.5 % of the error and
-    /// 0.0004.
+    /// Larger changes than this are called better or worse: the spread over the seeds, but at least 0.5 % of the value and
+    /// 0.0004 (half a refresh for latencies).
     pub fn tolerance(&self) -> f64 {
-        self.spread.max(NO_CHANGE * self.a).max(NO_ERROR)
+        let part = NO_CHANGE * self.a.unwrap_or(0.0);
+        self.spread.max(part).max(self.measure.least(&self.group))
     }
 
-    /// Whether the error moved by more than [`tolerance`](DifferenceRow::tolerance).
+    /// Whether the value moved by more than [`tolerance`](DifferenceRow::tolerance).
     pub fn verdict(&self) -> Verdict {
-        let change = self.b - self.a;
-        if change.abs() <= self.tolerance() {
-            Verdict::Same
-        } else if change < 0.0 {
+        let (a, b) = match (self.a, self.b) {
+            (Some(a), Some(b)) => (a, b),
+            (None, None) => return Verdict::Same,
+            (None, Some(_)) => return Verdict::Better,
+            (Some(_), None) => return Verdict::Worse,
+        };
+        let rise = if self.measure == Measure::Ssim { a - b } else { b - a };
+        // Written so that a value that is no number is worse.
+        if rise < -self.tolerance() {
             Verdict::Better
+        } else if rise <= self.tolerance() {
+            Verdict::Same
         } else {
             Verdict::Worse
         }
@@ -86,21 +157,29 @@ impl Difference {
     /// Compares `b` with `a`, the older one.
     pub fn between(a: &Results, b: &Results) -> Difference {
         let (groups_a, groups_b) = (groups(a), groups(b));
-        let row = |(group, errors_a): &(RunGroup, Vec<f64>)| {
-            let (_, errors_b) = groups_b.iter().find(|(other, _)| other == group)?;
-            Some(DifferenceRow {
-                group: group.clone(),
-                a: mean(errors_a),
-                b: mean(errors_b),
-                spread: spread(errors_a).max(spread(errors_b)),
-            })
-        };
-        let only_in = |these: &[(RunGroup, Vec<f64>)], those: &[(RunGroup, Vec<f64>)]| {
+        let mut rows = Vec::new();
+        for (group, runs_a) in &groups_a {
+            let Some((_, runs_b)) = groups_b.iter().find(|(other, _)| other == group) else {
+                continue;
+            };
+            for measure in Measure::all_of(runs_a[0]) {
+                let values = |runs: &[&RunResult]| -> Option<Vec<f64>> {
+                    runs.iter().map(|run| measure.of(run)).collect()
+                };
+                let (a, b) = (values(runs_a), values(runs_b));
+                if a.is_some() || b.is_some() || measure == Measure::Rmse {
+                    let spread = a.as_deref().map_or(0.0, spread);
+                    let (a, b) = (a.as_deref().map(mean), b.as_deref().map(mean));
+                    rows.push(DifferenceRow { group: group.clone(), measure, a, b, spread });
+                }
+            }
+        }
+        let only_in = |these: &[Group], those: &[Group]| {
             let is_there = |group: &RunGroup| those.iter().any(|(other, _)| other == group);
             these.iter().map(|(group, _)| group.clone()).filter(|group| !is_there(group)).collect()
         };
         Difference {
-            rows: groups_a.iter().filter_map(row).collect(),
+            rows,
             only_in_a: only_in(&groups_a, &groups_b),
             only_in_b: only_in(&groups_b, &groups_a),
         }
@@ -112,15 +191,16 @@ impl Difference {
     }
 }
 
-/// Groups in the order of their first run, with the mean RMSE of every run that has one.
-fn groups(results: &Results) -> Vec<(RunGroup, Vec<f64>)> {
-    let mut groups: Vec<(RunGroup, Vec<f64>)> = Vec::new();
+type Group<'a> = (RunGroup, Vec<&'a RunResult>);
+
+/// Groups in the order of their first run.
+fn groups(results: &Results) -> Vec<Group<'_>> {
+    let mut groups: Vec<Group> = Vec::new();
     for run in &results.runs {
-        let Some(error) = run.rmse.mean else { continue };
         let group = group_of(run, results.unscored_refreshes);
         match groups.iter_mut().find(|(known, _)| *known == group) {
-            Some((_, errors)) => errors.push(error),
-            None => groups.push((group, vec![error])),
+            Some((_, runs)) => runs.push(run),
+            None => groups.push((group, vec![run])),
         }
     }
     groups
@@ -135,13 +215,13 @@ fn group_of(run: &RunResult, unscored: usize) -> RunGroup {
     }
 }
 
-fn mean(errors: &[f64]) -> f64 {
-    errors.iter().sum::<f64>() / errors.len() as f64
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
 }
 
-fn spread(errors: &[f64]) -> f64 {
-    let largest = errors.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let smallest = errors.iter().copied().fold(f64::INFINITY, f64::min);
+fn spread(values: &[f64]) -> f64 {
+    let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
     largest - smallest
 }
 
@@ -150,31 +230,59 @@ mod tests {
     use super::*;
     use crate::made_up::results_of;
 
+    fn verdicts_of(difference: &Difference, measure: &Measure) -> Vec<Verdict> {
+        let rows = difference.rows.iter().filter(|row| row.measure == *measure);
+        rows.map(DifferenceRow::verdict).collect()
+    }
+
     #[test]
     fn worse_is_what_moves_by_more_than_the_seeds_do() {
         let a = results_of(&[("sphere", "change", &[0.050, 0.052]), ("sphere", "framed", &[0.1])]);
         let verdicts = |change: &[f64], framed: f64| {
             let b = results_of(&[("sphere", "change", change), ("sphere", "framed", &[framed])]);
-            let difference = Difference::between(&a, &b);
-            let rows = difference.rows.iter();
-            rows.map(DifferenceRow::verdict).collect::<Vec<_>>()
+            verdicts_of(&Difference::between(&a, &b), &Measure::Rmse)
         };
-        assert_eq!(verdicts(&[0.050, 0.052], 0.1), [Verdict::Same, Verdict::Same]);
-        assert_eq!(verdicts(&[0.0515, 0.0535], 0.1004), [Verdict::Same, Verdict::Same]);
-        assert_eq!(verdicts(&[0.0535, 0.0540], 0.1006), [Verdict::Worse, Verdict::Worse]);
-        assert_eq!(verdicts(&[0.0480, 0.0481], 0.09), [Verdict::Better, Verdict::Better]);
+        use Verdict::{Better, Same, Worse};
+        assert_eq!(verdicts(&[0.050, 0.052], 0.1), [Same, Same]);
+        assert_eq!(verdicts(&[0.0515, 0.0535], 0.1004), [Same, Same]);
+        assert_eq!(verdicts(&[0.0535, 0.0540], 0.1006), [Worse, Worse]);
+        assert_eq!(verdicts(&[0.0480, 0.0481], 0.09), [Better, Better]);
+        // A seed that goes astray does not widen what is allowed.
+        assert_eq!(verdicts(&[0.050, 0.5], 0.1), [Worse, Same]);
     }
 
     #[test]
     fn errors_that_nobody_sees_and_none_at_all() {
-        let difference = |a: f64, b: f64| {
+        let verdict = |a: f64, b: f64| {
             let results = |error: f64| results_of(&[("sphere", "framed", &[error])]);
-            Difference::between(&results(a), &results(b)).rows[0].clone()
+            verdicts_of(&Difference::between(&results(a), &results(b)), &Measure::Rmse)[0]
         };
-        assert_eq!(difference(0.0, 0.0).ratio(), 1.0);
-        assert_eq!(difference(0.0, 0.0003).verdict(), Verdict::Same);
-        assert_eq!(difference(0.0, 0.01).verdict(), Verdict::Worse);
-        assert_eq!(difference(0.0, 0.01).ratio(), f64::INFINITY);
+        assert_eq!(verdict(0.0, 0.0003), Verdict::Same);
+        assert_eq!(verdict(0.0, 0.01), Verdict::Worse);
+        assert_eq!(verdict(0.01, f64::NAN), Verdict::Worse);
+    }
+
+    #[test]
+    fn every_measure_is_compared() {
+        let a = results_of(&[("sphere", "framed", &[0.1])]);
+        let verdict = |measure: Measure, change: &dyn Fn(&mut RunResult)| {
+            let mut b = a.clone();
+            change(&mut b.runs[0]);
+            verdicts_of(&Difference::between(&a, &b), &measure)
+        };
+        use Verdict::{Better, Worse};
+        assert_eq!(verdict(Measure::RmseP95, &|run| run.rmse.p95 = Some(0.2)), [Worse]);
+        let changed: &dyn Fn(&mut RunResult) = &|run| run.rmse_changed.mean = Some(0.9);
+        assert_eq!(verdict(Measure::RmseChanged, changed), [Worse]);
+        assert_eq!(verdict(Measure::Ssim, &|run| run.ssim.mean = Some(0.5)), [Worse]);
+        assert_eq!(verdict(Measure::Ssim, &|run| run.ssim.mean = Some(0.95)), [Better]);
+        assert_eq!(verdict(Measure::Flip, &|run| run.flip.mean = None), [Worse]);
+        let cut = Measure::Latency("cut".into());
+        let quick: &dyn Fn(&mut RunResult) = &|run| run.events[0].latency_secs = Some(0.1);
+        assert_eq!(verdict(cut.clone(), quick), [Better]);
+        let mut followed = a.clone();
+        quick(&mut followed.runs[0]);
+        assert_eq!(verdicts_of(&Difference::between(&followed, &a), &cut), [Worse]);
     }
 
     #[test]
@@ -182,7 +290,7 @@ mod tests {
         let a = results_of(&[("sphere", "change", &[0.05]), ("many", "change", &[0.1])]);
         let mut b = results_of(&[("sphere", "change", &[0.05]), ("sphere", "framed", &[0.1])]);
         let difference = Difference::between(&a, &b);
-        assert_eq!(difference.rows.len(), 1);
+        assert!(difference.rows.iter().all(|row| row.group.scene == "sphere"));
         assert_eq!(difference.only_in_a[0].scene, "many");
         assert_eq!(difference.only_in_b[0].algorithm, "framed");
         // Other sizes have other errors: nothing is comparable then.

@@ -44,7 +44,7 @@ pub use results::{
 };
 
 pub use compare::{Progress, compare};
-pub use difference::{Difference, DifferenceRow, RunGroup, Verdict};
+pub use difference::{Difference, DifferenceRow, Measure, RunGroup, Verdict};
 pub use error::EvalError;
 pub use ranking::{Metric, Ranking, RankingRow};
 pub use selection::Selection;

@@ -3,7 +3,7 @@
 use crate::contender::Shown;
 use crate::experiment::Experiment;
 use crate::ideal::{IdealEvent, Ideals, refresh_time};
-use crate::metrics::{differ, flip, psnr_db, rmse, rmse_where, ssim};
+use crate::metrics::{differ, flip, rmse, rmse_where, ssim};
 use crate::results::{AtRest, Curve, EventResult, RunResult};
 use crate::run::Cell;
 
@@ -97,7 +97,7 @@ impl<'a> Record<'a> {
             height: size.height,
             display_hz,
             refreshes,
-            psnr_db: curve(self.rmse.iter().map(|&rmse| psnr_db(rmse)).collect(), LOW_TAIL),
+            psnr_db: Curve::psnr_db(&self.rmse, unscored),
             rmse: curve(self.rmse.into_iter().map(Some).collect(), HIGH_TAIL),
             rmse_changed: curve(self.rmse_changed, HIGH_TAIL),
             ssim: Curve::new(self.ssim, metrics.ssim_every, unscored, LOW_TAIL),

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::metrics::{mean, quantile};
+use crate::metrics::{mean, psnr_db, quantile};
 
 /// Version of the format; increased when a field changes its meaning or goes away.
 pub const RESULTS_VERSION: u32 = 2;
@@ -47,8 +47,8 @@ pub struct RunResult {
     pub refreshes: usize,
     /// Root mean squared error against the ideal, over all pixels and channels, in sRGB [0, 1].
     pub rmse: Curve,
-    /// Peak signal-to-noise ratio of the same, −20 log10(RMSE), in dB; `null` where the pictures are equal (infinite): mean
-    /// and percentile are over the finite ones.
+    /// Peak signal-to-noise ratio of the same, −20 log10(RMSE), in dB; `null` where the pictures are equal (infinite). `mean`
+    /// is that of the mean squared error, not of the decibels, where refreshes without an error could not count.
     pub psnr_db: Curve,
     /// RMSE over the pixels whose ideal has changed by more than 0.04 within the last 100 ms; `null` where none has.
     pub rmse_changed: Curve,
@@ -73,7 +73,7 @@ pub struct RunResult {
 pub struct Curve {
     /// Mean over the scored refreshes that have a value; `null` if none has.
     pub mean: Option<f64>,
-    /// 95th percentile over the same. For PSNR and SSIM, where low is bad, the 5th.
+    /// 95th percentile over the same. For PSNR and SSIM, where low is bad, the 5th. `null` of fewer than 20 values.
     pub p95: Option<f64>,
     /// Entry i is at refresh `(i + 1) · every − 1`, and refresh k at (k + 1) / display_hz seconds. Unscored refreshes are
     /// included. 0: not measured.
@@ -82,15 +82,34 @@ pub struct Curve {
     pub values: Vec<Option<f64>>,
 }
 
+/// A percentile of fewer values would be one of their extremes.
+const FEWEST_FOR_A_PERCENTILE: usize = 20;
+
 impl Curve {
     /// `values` at every `every`-th refresh; `tail`: 0.95 where high values are bad, 0.05 where low ones are.
     pub(crate) fn new(values: Vec<Option<f64>>, every: usize, unscored: usize, tail: f64) -> Curve {
-        let scored =
-            |(i, value): (usize, &Option<f64>)| value.filter(|_| (i + 1) * every > unscored);
-        let scored: Vec<f64> = values.iter().enumerate().filter_map(scored).collect();
-        let p95 = (!scored.is_empty()).then(|| quantile(scored.clone(), tail));
+        let scored = scored(&values, every, unscored);
+        let p95 =
+            (scored.len() >= FEWEST_FOR_A_PERCENTILE).then(|| quantile(scored.clone(), tail));
         Curve { mean: mean(scored), p95, every, values }
     }
+
+    /// PSNR in dB from the RMSE of every refresh.
+    pub(crate) fn psnr_db(rmse: &[f64], unscored: usize) -> Curve {
+        let errors = Curve::new(rmse.iter().copied().map(Some).collect(), 1, unscored, 0.95);
+        let squares = scored(&errors.values, 1, unscored).into_iter().map(|rmse| rmse * rmse);
+        Curve {
+            mean: mean(squares).and_then(|mse| psnr_db(mse.sqrt())),
+            p95: errors.p95.and_then(psnr_db),
+            every: 1,
+            values: rmse.iter().map(|&rmse| psnr_db(rmse)).collect(),
+        }
+    }
+}
+
+fn scored(values: &[Option<f64>], every: usize, unscored: usize) -> Vec<f64> {
+    let is_scored = |(i, value): (usize, &Option<f64>)| value.filter(|_| (i + 1) * every > unscored);
+    values.iter().enumerate().filter_map(is_scored).collect()
 }
 
 /// How fast an algorithm follows a sudden change.

@@ -1,5 +1,6 @@
-//! A bar on the terminal, and Ctrl-C as the wish to stop.
+//! A bar on the terminal, or lines where there is none; and Ctrl-C as the wish to stop.
 
+use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -37,6 +38,11 @@ impl Progress for Bar {
 
     fn stage(&self, what: &str) {
         self.bar.set_message(what.to_owned());
+        // A log has no place for a bar.
+        if !std::io::stderr().is_terminal() {
+            let percent = 100 * self.bar.position() / self.bar.length().unwrap_or(1).max(1);
+            eprintln!("{percent:>3} % {what}");
+        }
     }
 
     fn advance(&self, work: u64) {

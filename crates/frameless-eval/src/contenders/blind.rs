@@ -2,7 +2,8 @@
 //! tracing samples that are replaced before anybody sees them.
 //!
 //! Whom a sampler chooses does not depend on what is seen there, so that choosing can run ahead; at every refresh each
-//! pixel that has been chosen is traced once, at the last of its times. At 64 times the sketch's rate that is a fifth of the work.
+//! pixel that has been chosen is traced once, at the last of its times. At 64 times the sketch's rate a picture of 512×384 is chosen
+//! five times over from refresh to refresh.
 
 use frameless::{Answer, Batch, Clock, Engine, EngineError, Request, Sampler, Size, Time, Tracer};
 

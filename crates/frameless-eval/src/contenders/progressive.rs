@@ -5,7 +5,7 @@
 //! resolution that holds 30 Hz. As soon as nothing has moved, jittered samples accumulate at full
 //! resolution, pass after pass, visible as they come over the low-resolution frame.
 //!
-//! Not handicapped: changes are seen without delay, a frame begins at once, upsampling is bilinear, the first pass goes through the pixel
+//! Not handicapped: changes are seen within 1/120 s at rest and between frames in motion, a frame begins at once, upsampling is bilinear, the first pass goes through the pixel
 //! centres, and no time is lost to display or denoising.
 
 use frameless::{EngineError, Request, Rng, Size, Time};

@@ -75,6 +75,13 @@ pub(super) fn check(file: ExperimentFile, folder: &Path) -> Result<Experiment, S
             return Err(format!("{key} is empty: at least one is needed"));
         }
     }
+    let twice = [
+        ("seeds", first_twice(&file.seeds).map(u64::to_string)),
+        ("samples_per_sec", first_twice(&file.samples_per_sec).map(f64::to_string)),
+    ];
+    if let Some((key, Some(twice))) = twice.into_iter().find(|(_, twice)| twice.is_some()) {
+        return Err(format!("{key}: {twice} is there twice"));
+    }
     for (i, algorithm) in algorithms.iter().enumerate() {
         if algorithms[..i].contains(algorithm) {
             return Err(format!("algorithms: {:?} is there twice", algorithm.name()));
@@ -178,6 +185,10 @@ fn checked_show(show: Vec<String>, algorithms: &[Algorithm]) -> Result<Vec<Strin
     Ok(if show.is_empty() { known } else { show })
 }
 
+fn first_twice<T: PartialEq>(values: &[T]) -> Option<&T> {
+    values.iter().enumerate().find(|(i, value)| values[..*i].contains(value)).map(|(_, value)| value)
+}
+
 fn checked_equal_quality(
     table: EqualQualityTable,
     known: &[Algorithm],
@@ -201,9 +212,10 @@ fn checked_equal_quality(
         };
         names.iter().map(find).collect()
     };
-    Ok(EqualQualitySpec {
-        algorithms: among("algorithms", table.algorithms)?,
-        opponents: among("opponents", table.opponents)?,
-        max_factor: table.max_factor,
-    })
+    let algorithms = among("algorithms", table.algorithms)?;
+    let opponents = among("opponents", table.opponents)?;
+    if let Some(alone) = algorithms.iter().find(|a| opponents.iter().all(|other| other == *a)) {
+        return Err(format!("equal_quality: {} has no opponent but itself", alone.name()));
+    }
+    Ok(EqualQualitySpec { algorithms, opponents, max_factor: table.max_factor })
 }

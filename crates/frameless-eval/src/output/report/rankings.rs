@@ -18,7 +18,7 @@ pub(super) fn section(results: &Results) -> Markup {
             }
             @for &metric in &metrics {
                 div data-metric=(metric.name()) {
-                    p.note { (metric.explanation()) " Means over refreshes and seeds; click a column to sort by it." }
+                    p.note { (metric.explanation()) " Mean over the seeds; click a column to sort by it." }
                     @for rate in results.rates() {
                         div.scroll data-rate=(rate) { (table(&Ranking::new(results, rate, metric), metric)) }
                     }

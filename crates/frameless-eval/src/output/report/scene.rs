@@ -77,7 +77,7 @@ fn latencies(results: &Results, scene: &str, samples_per_sec: f64) -> Markup {
         h3 { "Latency" }
         p.note {
             "From each event until 90 % of the pixels that it changes are within 0.05 of the ideal, mean over the seeds; “–”: not \
-             before the next event."
+             before the next event, or nothing to follow."
         }
         div.scroll {
             table.sortable.numbers {
@@ -87,7 +87,10 @@ fn latencies(results: &Results, scene: &str, samples_per_sec: f64) -> Markup {
                         @for event in events {
                             th scope="col" {
                                 (event.name) " at " (format!("{:.2}", event.secs)) " s"
-                                small { (words::count(event.changed_pixels, "pixel")) }
+                                small {
+                                    @if event.changed_pixels == 0 { "changes nothing" }
+                                    @else { (words::count(event.changed_pixels, "pixel")) }
+                                }
                             }
                         }
                     }
