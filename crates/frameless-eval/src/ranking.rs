@@ -58,7 +58,9 @@ impl Metric {
             Metric::RmseChanged => {
                 "RMSE over the pixels whose ideal has changed by more than 0.04 within the last 100 ms; lower is better."
             }
-            Metric::Psnr => "Peak signal-to-noise ratio in dB, of the mean squared error; higher is better.",
+            Metric::Psnr => {
+                "Peak signal-to-noise ratio in dB, of the mean squared error; higher is better."
+            }
             Metric::Ssim => {
                 "Structural similarity to the ideal (Wang et al. 2004), 1 for equal pictures; higher is better."
             }

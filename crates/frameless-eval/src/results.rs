@@ -89,8 +89,7 @@ impl Curve {
     /// `values` at every `every`-th refresh; `tail`: 0.95 where high values are bad, 0.05 where low ones are.
     pub(crate) fn new(values: Vec<Option<f64>>, every: usize, unscored: usize, tail: f64) -> Curve {
         let scored = scored(&values, every, unscored);
-        let p95 =
-            (scored.len() >= FEWEST_FOR_A_PERCENTILE).then(|| quantile(scored.clone(), tail));
+        let p95 = (scored.len() >= FEWEST_FOR_A_PERCENTILE).then(|| quantile(scored.clone(), tail));
         Curve { mean: mean(scored), p95, every, values }
     }
 
@@ -108,7 +107,8 @@ impl Curve {
 }
 
 fn scored(values: &[Option<f64>], every: usize, unscored: usize) -> Vec<f64> {
-    let is_scored = |(i, value): (usize, &Option<f64>)| value.filter(|_| (i + 1) * every > unscored);
+    let is_scored =
+        |(i, value): (usize, &Option<f64>)| value.filter(|_| (i + 1) * every > unscored);
     values.iter().enumerate().filter_map(is_scored).collect()
 }
 

@@ -186,7 +186,11 @@ fn checked_show(show: Vec<String>, algorithms: &[Algorithm]) -> Result<Vec<Strin
 }
 
 fn first_twice<T: PartialEq>(values: &[T]) -> Option<&T> {
-    values.iter().enumerate().find(|(i, value)| values[..*i].contains(value)).map(|(_, value)| value)
+    values
+        .iter()
+        .enumerate()
+        .find(|(i, value)| values[..*i].contains(value))
+        .map(|(_, value)| value)
 }
 
 fn checked_equal_quality(

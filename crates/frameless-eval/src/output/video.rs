@@ -17,7 +17,7 @@ use crate::error::EvalError;
 use frameless::Size;
 
 // Noise is what these videos are about: it must survive. At 30 the dots of frameless pictures begin to smear.
-const WORST_QUANTIZER: u8 = 24;
+const WORST_QUANTIZER: u8 = 29;
 // A key frame per second, so that players can seek.
 const KEY_FRAME_SECS: u32 = 1;
 // Far more than needed: quality is limited by the quantizer.
