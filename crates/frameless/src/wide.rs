@@ -2,6 +2,8 @@
 //!
 //! The results do not depend on it: every lane does the same IEEE operations, and nothing is contracted.
 #![allow(unsafe_code)]
+// A lane is an index: what the compiler turns into one instruction reads like one.
+#![allow(clippy::needless_range_loop)]
 
 /// A loop to be compiled twice.
 pub(crate) trait Task {

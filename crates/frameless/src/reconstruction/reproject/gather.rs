@@ -190,8 +190,8 @@ impl Model<'_> {
         let dy = F8::load(&self.store.px[1], i) - eight.centre[1];
         let ticks = M8::load(&self.store.tick, i);
         let mut age_secs = [0.0; 8];
-        for lane in 0..8 {
-            age_secs[lane] = Tick(ticks.0[lane]).secs_until(self.now);
+        for (age_secs, tick) in age_secs.iter_mut().zip(ticks.0) {
+            *age_secs = Tick(tick).secs_until(self.now);
         }
         eight.v * F8(age_secs) + eight.s * (dx * dx + dy * dy)
     }
