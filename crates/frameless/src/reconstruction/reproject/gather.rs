@@ -5,8 +5,9 @@
 //! w_j = 1 / (e_j + ε)²                  over the samples of the reference's object
 //! ```
 //!
-//! The reference is the pixel's own sample with the least expected error. Pixels without one are holes; they show what the nearest
-//! pixel shows that is none ([`fill`](super::fill)).
+//! The reference is the pixel's own sample with the least expected error. Pixels without one are holes: beside samples they show
+//! the mean of those around that belong to the nearest one's object, farther away what the nearest pixel shows that is no hole
+//! ([`fill`](super::fill)).
 
 use super::fill;
 use super::store::{EMPTY, Store, Tick};
@@ -91,7 +92,9 @@ impl Gather {
         fill::nearest(store.layout.size, &self.empty, &mut self.source);
         for &pixel in &self.empty {
             let i = pixel as usize;
-            if let Some(source) = self.source(i) {
+            if let Some(rgb) = model.between(pixel) {
+                picture[i] = rgb;
+            } else if let Some(source) = self.source(i) {
                 picture[i] = picture[source as usize];
             }
             self.holes[i] = fill::kind(store.layout.size, &self.source, pixel);
@@ -216,6 +219,37 @@ impl Model<'_> {
             }
         }
         [red / weights, green / weights, blue / weights]
+    }
+}
+
+impl Model<'_> {
+    /// A hole beside samples: the mean of those around it that belong to the nearest one's object. `None` if there are none.
+    fn between(&self, pixel: u32) -> Option<[f32; 3]> {
+        let layout = &self.store.layout;
+        let (x, y) = layout.size.xy(pixel);
+        let (n, tile) = (layout.per_side as i32, self.rates.grid.tile_of(pixel));
+        let (v, s) = (self.rates.of_tile(tile), self.contrast[tile]);
+        let around = move || {
+            let rows = -n..2 * n;
+            let cells = rows.flat_map(move |dy| (-n..2 * n).map(move |dx| (dx, dy)));
+            let cells = cells.map(move |(dx, dy)| layout.neighbour(x as i32, y as i32, dx, dy));
+            cells.filter(|&i| !self.store.is_empty(i))
+        };
+        let distance2 = |i: usize| {
+            let dx = self.store.px[0][i] - (x as f32 + 0.5);
+            let dy = self.store.px[1][i] - (y as f32 + 0.5);
+            dx * dx + dy * dy
+        };
+        let nearest = around().min_by(|&a, &b| distance2(a).total_cmp(&distance2(b)))?;
+        let (mut sum, mut weights) = ([0.0; 3], 0.0);
+        for i in around().filter(|&i| self.store.object[i] == self.store.object[nearest]) {
+            let age_secs = Tick(self.store.tick[i]).secs_until(self.now);
+            let error = v * age_secs + s * distance2(i) + least_error(s);
+            let weight = 1.0 / (error * error);
+            (0..3).for_each(|k| sum[k] += weight * self.store.rgb[k][i]);
+            weights += weight;
+        }
+        Some(sum.map(|c| c / weights))
     }
 }
 
