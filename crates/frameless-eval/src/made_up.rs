@@ -20,7 +20,7 @@ pub(crate) fn results_of(runs: &[(&str, &str, &[f64])]) -> Results {
 }
 
 fn run(scene: &str, algorithm: &str, seed: u64, error: f64) -> RunResult {
-    let constant = |value: f64| Curve::new(vec![Some(value); 10], 1, 2, 0.95);
+    let constant = |value: f64| Curve::new(vec![Some(value); 30], 1, 2, 0.95);
     RunResult {
         scene: scene.into(),
         algorithm: algorithm.into(),
@@ -29,7 +29,7 @@ fn run(scene: &str, algorithm: &str, seed: u64, error: f64) -> RunResult {
         width: 64,
         height: 48,
         display_hz: 60,
-        refreshes: 10,
+        refreshes: 30,
         rmse: constant(error),
         psnr_db: constant(-20.0 * error.log10()),
         rmse_changed: constant(2.0 * error),
