@@ -201,3 +201,18 @@ fn the_experiments_in_the_repository_are_valid() {
     }
     assert!(read >= 4);
 }
+
+#[test]
+fn the_results_that_are_kept_can_be_read() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../results");
+    let mut kept = 0;
+    for entry in std::fs::read_dir(folder).expect("the folder of results") {
+        let path = entry.expect("readable").path();
+        if path.extension().is_some_and(|extension| extension == "json") {
+            let results = frameless_eval::Results::read(&path).expect("of this version");
+            assert!(results.runs.iter().all(|run| run.rmse.mean.is_some()), "{}", path.display());
+            kept += 1;
+        }
+    }
+    assert!(kept >= 4, "{kept} files");
+}
