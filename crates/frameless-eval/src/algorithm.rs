@@ -42,7 +42,8 @@ const PLAIN: [(&str, Algorithm); 7] = [
 
 impl Algorithm {
     /// `random`, `permutation`, `change`, `framed`, `framed-single`, `lowres60`, `lowres30`, `progressive`,
-    /// `temporal`, `oracle-hold`; with parameters: `change(w_d=0.7,tile=8)`. After a sampler `+hold` may be written out.
+    /// `temporal`, `oracle-hold`; with parameters: `change(w_d=0.7,tile=8)`. After a sampler `+hold`, `+filter`,
+    /// `+reproject` or `+reproject+deep`; without, it is `+hold`.
     ///
     /// # Errors
     /// What was wanted, if the name is not one of these.
@@ -59,7 +60,10 @@ impl Algorithm {
             let samplers = SamplerKind::ALL.map(|kind| kind.name());
             let known: Vec<&str> =
                 samplers.into_iter().chain(PLAIN.map(|(name, _)| name)).collect();
-            format!("unknown algorithm {name:?}; there are: {}", known.join(", "))
+            format!(
+                "unknown algorithm {name:?}; there are: {}; after a sampler +hold, +filter, +reproject or +reproject+deep",
+                known.join(", ")
+            )
         })?;
         match (kind, parameters) {
             (kind, None) => Ok(Algorithm::Frameless(kind, reconstruction)),
@@ -184,7 +188,17 @@ mod tests {
     #[test]
     fn names_there_and_back() {
         let plain = PLAIN.map(|(name, _)| name);
-        let samplers = ["random", "permutation", "change", "change(w_d=0.5,tile=8)"];
+        let samplers = [
+            "random",
+            "permutation",
+            "change",
+            "change(w_d=0.5,tile=8)",
+            "change+filter",
+            "permutation+reproject",
+            "adaptive+hold",
+            "adaptive+reproject",
+            "adaptive+reproject+deep",
+        ];
         for name in plain.into_iter().chain(samplers) {
             assert_eq!(Algorithm::from_name(name).expect(name).name(), name);
         }

@@ -5,7 +5,7 @@
 //! pixel that has been chosen is traced once, at the last of its times. At 64 times the sketch's rate a picture of 512×384 is chosen
 //! five times over from refresh to refresh.
 
-use frameless::{Answer, Batch, Clock, Engine, EngineError, Request, Sampler, Size, Time, Tracer};
+use frameless::{Answer, Batch, Clock, Engine, EngineError, Request, Sampler, Time, Tracer};
 
 use crate::contender::{Arena, Contender, Shown, encode};
 use crate::metrics::Picture;
@@ -18,7 +18,6 @@ pub(crate) struct Blind<'a> {
 
 /// Notes what was asked for, and answers black.
 struct Notes {
-    size: Size,
     answer: Option<Answer>,
     /// Scene time at which each pixel was chosen last; NaN if not since the last refresh.
     chosen_secs: Vec<f64>,
@@ -28,7 +27,6 @@ struct Notes {
 impl<'a> Blind<'a> {
     pub(crate) fn new(arena: Arena<'a>, sampler: Box<dyn Sampler>) -> Blind<'a> {
         let notes = Notes {
-            size: arena.size,
             answer: None,
             chosen_secs: vec![f64::NAN; arena.size.pixels()],
             chosen: Vec::new(),
@@ -74,7 +72,6 @@ impl Contender for Blind<'_> {
 
 impl Tracer for Notes {
     fn submit(&mut self, batch: Batch) {
-        debug_assert_eq!(batch.size, self.size);
         for request in &batch.requests {
             let secs = &mut self.chosen_secs[request.pixel as usize];
             if secs.is_nan() {

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! with v the learned rate of change of the tile ([`Rates`]) and s its spatial contrast. Where nothing changes (v = 0) that is
-//! `hold`; where samples are old it leans on younger neighbours. The radius follows from where both terms meet, √(v·age/s).
+//! `hold`, and so it is with a sampler that learns no rates; where samples are old it leans on younger neighbours. The radius follows from where both terms meet, √(v·age/s).
 
 use super::contrast::tile_contrast;
 use crate::{Canvas, Display, Kept, Rates, Reconstruction, Refresh};

@@ -40,12 +40,12 @@ pub struct Reproject {
 }
 
 impl Reproject {
-    /// `cells`: how many cells a pixel has in each direction; each holds one sample.
+    /// `cells`: how many cells a pixel has in each direction, 1 to 4; each holds one sample.
     pub fn new(cells: u32) -> Reproject {
-        let size = Size::new(1, 1);
+        let cells = cells.clamp(1, 4);
         Reproject {
-            cells: cells.clamp(1, 4),
-            store: Store::new(size, cells),
+            cells,
+            store: Store::new(Size::new(1, 1), cells),
             warp: Default::default(),
             gather: Default::default(),
             shown: Vec::new(),
