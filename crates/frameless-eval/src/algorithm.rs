@@ -42,8 +42,8 @@ const PLAIN: [(&str, Algorithm); 7] = [
 
 impl Algorithm {
     /// `random`, `permutation`, `change`, `framed`, `framed-single`, `lowres60`, `lowres30`, `progressive`,
-    /// `temporal`, `oracle-hold`; with parameters: `change(w_d=0.7,tile=8)`. After a sampler `+hold`, `+filter`,
-    /// `+reproject` or `+reproject+deep`; without, it is `+hold`.
+    /// `temporal`, `oracle-hold`, `adaptive`; with parameters: `change(w_d=0.7,tile=8)`, `adaptive(temporal=0.5)`. After a sampler
+    /// `+hold`, `+filter` or `+reproject` with its options, see [`ReconstructionKind::name`]; without, it is `+hold`.
     ///
     /// # Errors
     /// What was wanted, if the name is not one of these.
@@ -51,38 +51,38 @@ impl Algorithm {
         if let Some((_, algorithm)) = PLAIN.into_iter().find(|(plain, _)| *plain == name) {
             return Ok(algorithm);
         }
-        let (sampler, reconstruction) = split_reconstruction(name);
-        let (head, parameters) = match sampler.split_once('(') {
-            Some((head, rest)) => (head, Some(rest)),
-            None => (sampler, None),
-        };
-        let kind = SamplerKind::from_name(head).ok_or_else(|| {
+        let unknown = || {
             let samplers = SamplerKind::ALL.map(|kind| kind.name());
             let known: Vec<&str> =
                 samplers.into_iter().chain(PLAIN.map(|(name, _)| name)).collect();
             format!(
-                "unknown algorithm {name:?}; there are: {}; after a sampler +hold, +filter, +reproject or +reproject+deep",
+                "unknown algorithm {name:?}; there are: {}; after a sampler +hold, +filter or +reproject, \
+                 after that +relight, +deep, +antialias",
                 known.join(", ")
             )
-        })?;
-        match (kind, parameters) {
-            (kind, None) => Ok(Algorithm::Frameless(kind, reconstruction)),
-            (SamplerKind::Change { .. }, Some(text)) => {
-                Ok(Algorithm::Frameless(parse_change(name, text)?, reconstruction))
-            }
-            (_, Some(_)) => Err(format!("algorithm {name:?}: {head} has no parameters")),
-        }
+        };
+        let (sampler, reconstruction) = split_reconstruction(name).ok_or_else(unknown)?;
+        let (head, parameters) = match sampler.split_once('(') {
+            Some((head, rest)) => (head, Some(rest)),
+            None => (sampler, None),
+        };
+        let kind = SamplerKind::from_name(head).ok_or_else(unknown)?;
+        let kind = match parameters {
+            None => kind,
+            Some(text) => with_parameters(kind, name, text)?,
+        };
+        Ok(Algorithm::Frameless(kind, reconstruction))
     }
 
     /// The name that [`Algorithm::from_name`] understands.
     pub fn name(&self) -> String {
         match self {
             Algorithm::Frameless(sampler, reconstruction) => {
-                let suffix = match reconstruction {
-                    ReconstructionKind::Hold if *sampler != SamplerKind::Adaptive => "",
-                    other => suffix(*other),
-                };
-                sampler_name(sampler) + suffix
+                let is_adaptive = matches!(sampler, SamplerKind::Adaptive { .. });
+                match reconstruction {
+                    ReconstructionKind::Hold if !is_adaptive => sampler_name(sampler),
+                    other => format!("{}+{}", sampler_name(sampler), other.name()),
+                }
             }
             plain => {
                 let found = PLAIN.into_iter().find(|(_, algorithm)| algorithm == plain);
@@ -137,21 +137,12 @@ impl Algorithm {
     }
 }
 
-const SUFFIXES: [(&str, ReconstructionKind); 4] = [
-    ("+hold", ReconstructionKind::Hold),
-    ("+filter", ReconstructionKind::Filter),
-    ("+reproject+deep", ReconstructionKind::Deep),
-    ("+reproject", ReconstructionKind::Reproject),
-];
-
-fn split_reconstruction(name: &str) -> (&str, ReconstructionKind) {
-    let found =
-        SUFFIXES.iter().find_map(|(suffix, kind)| Some((name.strip_suffix(suffix)?, *kind)));
-    found.unwrap_or((name, ReconstructionKind::Hold))
-}
-
-fn suffix(kind: ReconstructionKind) -> &'static str {
-    SUFFIXES.iter().find(|(_, k)| *k == kind).expect("every kind has one").0
+/// The sampler's name with its parameters, and how its samples are shown; `None` if there is no such reconstruction.
+fn split_reconstruction(name: &str) -> Option<(&str, ReconstructionKind)> {
+    match name.split_once('+') {
+        Some((sampler, shown)) => Some((sampler, ReconstructionKind::from_name(shown)?)),
+        None => Some((name, ReconstructionKind::Hold)),
+    }
 }
 
 fn sampler_name(kind: &SamplerKind) -> String {
@@ -159,26 +150,47 @@ fn sampler_name(kind: &SamplerKind) -> String {
         SamplerKind::Change { w_d, tile } if *kind != SamplerKind::CHANGE => {
             format!("change(w_d={w_d},tile={tile})")
         }
+        SamplerKind::Adaptive { temporal } if *kind != SamplerKind::ADAPTIVE => {
+            format!("adaptive(temporal={temporal})")
+        }
         kind => kind.name().into(),
     }
 }
 
-fn parse_change(name: &str, text: &str) -> Result<SamplerKind, String> {
-    let wrong = || format!("algorithm {name:?}: wanted change(w_d=0.9,tile=16)");
-    let SamplerKind::Change { mut w_d, mut tile } = SamplerKind::CHANGE else {
-        return Err(wrong());
+/// `text` is what stands behind the opening bracket.
+fn with_parameters(kind: SamplerKind, name: &str, text: &str) -> Result<SamplerKind, String> {
+    let example = match kind {
+        SamplerKind::Change { .. } => "change(w_d=0.9,tile=16)",
+        SamplerKind::Adaptive { .. } => "adaptive(temporal=0.5)",
+        _ => return Err(format!("algorithm {name:?}: {} has no parameters", kind.name())),
     };
+    let wrong = || format!("algorithm {name:?}: wanted {example}");
+    let mut kind = kind;
     for parameter in text.strip_suffix(')').ok_or_else(wrong)?.split(',') {
-        match parameter.split_once('=').map(|(key, value)| (key.trim(), value.trim())) {
-            Some(("w_d", value)) => w_d = value.parse().map_err(|_| wrong())?,
-            Some(("tile", value)) => tile = value.parse().map_err(|_| wrong())?,
+        let (key, value) = parameter.split_once('=').ok_or_else(wrong)?;
+        let value = value.trim();
+        match (&mut kind, key.trim()) {
+            (SamplerKind::Change { w_d, .. }, "w_d") => {
+                *w_d = value.parse().map_err(|_| wrong())?
+            }
+            (SamplerKind::Change { tile, .. }, "tile") => {
+                *tile = value.parse().map_err(|_| wrong())?
+            }
+            (SamplerKind::Adaptive { temporal }, "temporal") => {
+                *temporal = value.parse().map_err(|_| wrong())?
+            }
             _ => return Err(wrong()),
         }
     }
-    if !(0.0..=1.0).contains(&w_d) || tile == 0 {
-        return Err(format!("algorithm {name:?}: w_d must be in [0, 1] and tile at least 1"));
+    match kind {
+        SamplerKind::Change { w_d, tile } if !(0.0..=1.0).contains(&w_d) || tile == 0 => {
+            Err(format!("algorithm {name:?}: w_d must be in [0, 1] and tile at least 1"))
+        }
+        SamplerKind::Adaptive { temporal } if !(0.0..=1.0).contains(&temporal) => {
+            Err(format!("algorithm {name:?}: temporal must be in [0, 1]"))
+        }
+        kind => Ok(kind),
     }
-    Ok(SamplerKind::Change { w_d, tile })
 }
 
 #[cfg(test)]
@@ -198,6 +210,7 @@ mod tests {
             "adaptive+hold",
             "adaptive+reproject",
             "adaptive+reproject+deep",
+            "adaptive(temporal=0.25)+reproject+relight",
         ];
         for name in plain.into_iter().chain(samplers) {
             assert_eq!(Algorithm::from_name(name).expect(name).name(), name);
@@ -217,6 +230,9 @@ mod tests {
             "change(w_d=2)",
             "change(tile=0)",
             "change(x=1)",
+            "change(temporal=1)",
+            "adaptive(temporal=2)",
+            "adaptive+deep",
             "change(w_d",
         ] {
             let message = Algorithm::from_name(name).expect_err(name);

@@ -334,6 +334,11 @@ impl<T: Tracer> Engine<T> {
         self.sampler = sampler;
     }
 
+    /// Trade temporal against spatial accuracy, see [`Sampler::set_temporal`].
+    pub fn set_temporal(&mut self, temporal: f32) {
+        self.sampler.set_temporal(temporal);
+    }
+
     /// The renderer.
     pub fn tracer(&self) -> &T {
         &self.tracer

@@ -61,7 +61,8 @@ pub use timeline::Timeline;
 pub use display::Display;
 pub use rates::Rates;
 pub use reconstruction::{
-    Filter, Hold, Kept, Reconstruction, ReconstructionKind, Refresh, Reproject, hold, hold_into,
+    Filter, Hold, Kept, Reconstruction, ReconstructionKind, Refresh, Reproject, ReprojectOptions,
+    hold, hold_into,
 };
 
 pub use rng::Rng;

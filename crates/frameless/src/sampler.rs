@@ -35,6 +35,12 @@ pub trait Sampler: Send {
         let _ = (canvas, observations);
     }
 
+    /// Trade temporal against spatial accuracy from now on: 1 sends every sample where the picture changes now, 0 finishes
+    /// what is there. What has been learned stays. Samplers that have no such choice ignore it.
+    fn set_temporal(&mut self, temporal: f32) {
+        let _ = temporal;
+    }
+
     /// How fast each part of the picture changes, if the sampler learns it; reconstructions weigh samples with it.
     fn rates(&self) -> Option<&Rates> {
         None

@@ -4,8 +4,8 @@
 //! every pixel's ideal colour is a formula, and a mixture of the two objects shows at once.
 
 use frameless::{
-    Answer, Batch, Canvas, Clock, Engine, Pose, Projection, ReconstructionKind, Request,
-    SamplerKind, Size, Surface, Time, Tracer,
+    Answer, Batch, Canvas, Clock, Engine, Pose, Projection, ReconstructionKind, ReprojectOptions,
+    Request, SamplerKind, Size, Surface, Time, Tracer,
 };
 
 const SIZE: Size = Size { width: 96, height: 72 };
@@ -114,7 +114,7 @@ fn world(camera: Camera, disc: fn(f64) -> [f32; 3]) -> World {
 
 fn engine(world: World, kind: ReconstructionKind, samples_per_sec: f64) -> Engine<Renderer> {
     let renderer = Renderer { world, answers: Vec::new() };
-    let sampler = SamplerKind::Adaptive.build(1);
+    let sampler = SamplerKind::ADAPTIVE.build(1);
     let clock = Clock::simulated(samples_per_sec);
     let mut engine = Engine::with_canvas(Canvas::new(SIZE), clock, sampler, renderer);
     engine.set_reconstruction(kind.build());
@@ -147,12 +147,14 @@ fn differences(a: &[[f32; 3]], b: &[[f32; 3]]) -> (usize, f32) {
     (offs.clone().filter(|off| *off > 0.0).count(), offs.fold(0.0, f32::max))
 }
 
-const KINDS: [ReconstructionKind; 4] = [
-    ReconstructionKind::Hold,
-    ReconstructionKind::Filter,
-    ReconstructionKind::Reproject,
-    ReconstructionKind::Deep,
-];
+const KINDS: [ReconstructionKind; 4] =
+    [ReconstructionKind::Hold, ReconstructionKind::Filter, ReconstructionKind::REPROJECT, DEEP];
+
+const DEEP: ReconstructionKind = ReconstructionKind::Reproject(ReprojectOptions {
+    deep: true,
+    relight: false,
+    antialias: false,
+});
 
 #[test]
 fn samples_follow_a_camera_that_translates_turns_and_zooms() {
@@ -173,7 +175,7 @@ fn samples_follow_a_camera_that_translates_turns_and_zooms() {
 #[test]
 fn no_sample_of_one_object_is_gathered_for_another() {
     let disc = |secs: f64| [20.0 + 60.0 * secs as f32, 36.0, 14.0];
-    for kind in [ReconstructionKind::Reproject, ReconstructionKind::Deep] {
+    for kind in [ReconstructionKind::REPROJECT, DEEP] {
         let mut engine = engine(world(rotating, disc), kind, 60_000.0);
         play(&mut engine, 10);
         let red = frameless::Display::default().encode([0.8, 0.0, 0.0])[0];
@@ -262,7 +264,7 @@ fn a_cut_leaves_nothing_of_the_picture_before() {
 #[test]
 fn a_picture_of_which_nothing_is_known_appears_everywhere_at_once() {
     let world = world(STILL, NO_DISC);
-    let mut engine = engine(world, ReconstructionKind::Reproject, 83_000.0);
+    let mut engine = engine(world, ReconstructionKind::REPROJECT, 83_000.0);
     // A fifth of the pixels: every pixel has a neighbour that was traced.
     let (picture, secs) = play(&mut engine, 1);
     let error = rmse(&picture, &world.ideal(secs));

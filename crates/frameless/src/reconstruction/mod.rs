@@ -63,20 +63,99 @@ pub enum ReconstructionKind {
     Hold,
     /// [`Filter`].
     Filter,
-    /// [`Reproject`].
-    Reproject,
-    /// [`Reproject`] with 2×2 cells per pixel.
-    Deep,
+    /// [`Reproject`]. A renderer that returns no surfaces gets [`Hold`]'s picture of it.
+    Reproject(ReprojectOptions),
+}
+
+/// What [`Reproject`] does beyond carrying samples along.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReprojectOptions {
+    /// Stored surfaces are shaded again with the present lights, if the renderer tells of them.
+    pub relight: bool,
+    /// 2×2 cells per pixel.
+    pub deep: bool,
+    /// Where the picture rests, jittered samples add up.
+    pub antialias: bool,
 }
 
 impl ReconstructionKind {
+    /// [`Reproject`] without options.
+    pub const REPROJECT: ReconstructionKind = ReconstructionKind::Reproject(ReprojectOptions {
+        relight: false,
+        deep: false,
+        antialias: false,
+    });
+
+    /// The name used on the command line and in experiments: `hold`, `filter`, `reproject`, the last followed by `+relight`,
+    /// `+deep`, `+antialias` as far as they are on.
+    pub fn name(&self) -> String {
+        match self {
+            ReconstructionKind::Hold => "hold".into(),
+            ReconstructionKind::Filter => "filter".into(),
+            ReconstructionKind::Reproject(options) => {
+                let named = [
+                    ("+relight", options.relight),
+                    ("+deep", options.deep),
+                    ("+antialias", options.antialias),
+                ];
+                let on = named.iter().filter(|(_, is_on)| *is_on).map(|(name, _)| *name);
+                std::iter::once("reproject").chain(on).collect()
+            }
+        }
+    }
+
+    /// The kind of that name; options in any order.
+    pub fn from_name(name: &str) -> Option<ReconstructionKind> {
+        let mut parts = name.split('+');
+        let mut options = ReprojectOptions::default();
+        let kind = parts.next()?;
+        for part in parts {
+            let option = match part {
+                "relight" => &mut options.relight,
+                "deep" => &mut options.deep,
+                "antialias" => &mut options.antialias,
+                _ => return None,
+            };
+            if std::mem::replace(option, true) {
+                return None;
+            }
+        }
+        match kind {
+            "reproject" => Some(ReconstructionKind::Reproject(options)),
+            _ if options != ReprojectOptions::default() => None,
+            "hold" => Some(ReconstructionKind::Hold),
+            "filter" => Some(ReconstructionKind::Filter),
+            _ => None,
+        }
+    }
+
     /// One of this kind, with nothing kept yet.
     pub fn build(&self) -> Box<dyn Reconstruction> {
-        match self {
+        match *self {
             ReconstructionKind::Hold => Box::new(Hold::default()),
             ReconstructionKind::Filter => Box::new(Filter::default()),
-            ReconstructionKind::Reproject => Box::new(Reproject::new(1)),
-            ReconstructionKind::Deep => Box::new(Reproject::new(2)),
+            ReconstructionKind::Reproject(options) => Box::new(Reproject::new(options)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_there_and_back() {
+        for name in
+            ["hold", "filter", "reproject", "reproject+deep", "reproject+relight+deep+antialias"]
+        {
+            let kind = ReconstructionKind::from_name(name).expect(name);
+            assert_eq!(kind.name(), name);
+        }
+        let other_order =
+            ReconstructionKind::from_name("reproject+deep+relight").expect("any order");
+        assert_eq!(other_order.name(), "reproject+relight+deep");
+        for name in ["", "held", "hold+deep", "reproject+", "reproject+deep+deep", "+deep"] {
+            assert_eq!(ReconstructionKind::from_name(name), None, "{name}");
         }
     }
 }

@@ -6,6 +6,7 @@ mod permutation;
 mod random;
 
 pub use adaptive::Adaptive;
+pub(crate) use adaptive::DEFAULT_TEMPORAL;
 pub use change::{Change, DEFAULT_TILE, DEFAULT_W_D};
 pub use permutation::Permutation;
 pub use random::Random;
@@ -27,16 +28,22 @@ pub enum SamplerKind {
         tile: u32,
     },
     /// [`Adaptive`].
-    Adaptive,
+    Adaptive {
+        /// Temporal against spatial accuracy, in [0, 1]; see [`Sampler::set_temporal`].
+        temporal: f32,
+    },
 }
 
 impl SamplerKind {
     /// `change` with the measured defaults.
     pub const CHANGE: SamplerKind = SamplerKind::Change { w_d: DEFAULT_W_D, tile: DEFAULT_TILE };
 
+    /// `adaptive` with the measured default.
+    pub const ADAPTIVE: SamplerKind = SamplerKind::Adaptive { temporal: DEFAULT_TEMPORAL };
+
     /// Every kind with its default parameters.
     pub const ALL: [SamplerKind; 4] =
-        [SamplerKind::Random, SamplerKind::Permutation, SamplerKind::CHANGE, SamplerKind::Adaptive];
+        [SamplerKind::Random, SamplerKind::Permutation, SamplerKind::CHANGE, SamplerKind::ADAPTIVE];
 
     /// The name used on the command line and in experiments.
     pub fn name(&self) -> &'static str {
@@ -44,7 +51,7 @@ impl SamplerKind {
             SamplerKind::Random => "random",
             SamplerKind::Permutation => "permutation",
             SamplerKind::Change { .. } => "change",
-            SamplerKind::Adaptive => "adaptive",
+            SamplerKind::Adaptive { .. } => "adaptive",
         }
     }
 
@@ -59,7 +66,7 @@ impl SamplerKind {
             SamplerKind::Random => Box::new(Random::new(seed)),
             SamplerKind::Permutation => Box::new(Permutation::new(seed)),
             SamplerKind::Change { w_d, tile } => Box::new(Change::new(w_d, tile, seed)),
-            SamplerKind::Adaptive => Box::new(Adaptive::new(seed)),
+            SamplerKind::Adaptive { temporal } => Box::new(Adaptive::new(temporal, seed)),
         }
     }
 }

@@ -13,6 +13,7 @@ mod residual;
 mod store;
 mod warp;
 
+use super::ReprojectOptions;
 use super::contrast::tile_contrast;
 use crate::rates::Rates;
 use crate::tile::TileGrid;
@@ -21,6 +22,7 @@ use store::{Store, Tick};
 
 /// See the module.
 pub struct Reproject {
+    options: ReprojectOptions,
     /// Cells per pixel side.
     cells: u32,
     store: Store,
@@ -40,10 +42,11 @@ pub struct Reproject {
 }
 
 impl Reproject {
-    /// `cells`: how many cells a pixel has in each direction, 1 to 4; each holds one sample.
-    pub fn new(cells: u32) -> Reproject {
-        let cells = cells.clamp(1, 4);
+    /// Nothing kept yet.
+    pub fn new(options: ReprojectOptions) -> Reproject {
+        let cells = if options.deep { 2 } else { 1 };
         Reproject {
+            options,
             cells,
             store: Store::new(Size::new(1, 1), cells),
             warp: Default::default(),

@@ -27,8 +27,12 @@ const HOT_RATE: f32 = 0.01;
 /// Where this part of the tiles is hot fronts begin to lose their share; at twice as many they have none.
 const HOT_PART: f32 = 0.2;
 
+/// The default of [`Sampler::set_temporal`].
+pub(crate) const DEFAULT_TEMPORAL: f32 = 0.5;
+
 /// See the module.
 pub struct Adaptive {
+    temporal: f32,
     rng: Rng,
     state: Option<State>,
 }
@@ -56,9 +60,9 @@ enum Why {
 }
 
 impl Adaptive {
-    /// The same seed makes the same choices.
-    pub fn new(seed: u64) -> Adaptive {
-        Adaptive { rng: Rng::new(seed), state: None }
+    /// `temporal` in [0, 1]: see [`Sampler::set_temporal`]. The same seed makes the same choices.
+    pub fn new(temporal: f32, seed: u64) -> Adaptive {
+        Adaptive { temporal: temporal.clamp(0.0, 1.0), rng: Rng::new(seed), state: None }
     }
 }
 
@@ -152,6 +156,10 @@ impl Sampler for Adaptive {
         }
     }
 
+    fn set_temporal(&mut self, temporal: f32) {
+        self.temporal = temporal.clamp(0.0, 1.0);
+    }
+
     fn rates(&self) -> Option<&Rates> {
         self.state.as_ref().map(|state| &state.rates)
     }
@@ -186,7 +194,10 @@ mod tests {
     fn first_draws_are_pinned() {
         let size = Size::new(64, 48);
         let canvas = Canvas::from_picture(size, vec![[0.0; 3]; size.pixels()]);
-        assert_eq!(choose(&mut Adaptive::new(1), &canvas, 4), [645, 1986, 1638, 2459]);
+        assert_eq!(
+            choose(&mut Adaptive::new(DEFAULT_TEMPORAL, 1), &canvas, 4),
+            [645, 1986, 1638, 2459]
+        );
     }
 
     #[test]
@@ -194,7 +205,7 @@ mod tests {
         let size = Size::new(64, 32);
         let canvas = Canvas::new(size);
         // 40 % of the samples go to holes: the first 8 · 2 pixels are one of every 16 × 8.
-        let pixels = choose(&mut Adaptive::new(1), &canvas, 5 * 8);
+        let pixels = choose(&mut Adaptive::new(DEFAULT_TEMPORAL, 1), &canvas, 5 * 8);
         let mut blocks: Vec<(u32, u32)> =
             pixels[..16].iter().map(|&p| size.xy(p)).map(|(x, y)| (x / 16, y / 8)).collect();
         blocks.sort_unstable();
@@ -206,7 +217,7 @@ mod tests {
     fn samples_go_where_the_picture_changes_and_everywhere_else_as_well() {
         let size = Size::new(64, 64);
         let mut canvas = Canvas::from_picture(size, vec![[0.0; 3]; size.pixels()]);
-        let mut sampler = Adaptive::new(3);
+        let mut sampler = Adaptive::new(DEFAULT_TEMPORAL, 3);
         let is_restless = |pixel: u32| size.xy(pixel).0 < 8 && size.xy(pixel).1 < 8;
         let mut counts = vec![0u32; size.pixels()];
         for turn in 1..400u64 {
