@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use frameless::{Answer, Batch, Pose, Request, Size, Surface, Tracer};
+use frameless::{Answer, Batch, Lighting, Pose, Request, Size, Surface, Tracer};
 use frameless_scene::{Limits, State, View};
 use frameless_trace::{Moment, Settings, World};
 
@@ -176,6 +176,12 @@ impl Tracer for SubjectTracer<'_> {
         self.subject.update_moment(scene_secs, &mut self.moment);
         let view = self.subject.view(self.moment.state(), scene_secs);
         self.moment.pose(&view, size, pose);
+        true
+    }
+
+    fn lighting(&mut self, scene_secs: f64, lighting: &mut Lighting) -> bool {
+        self.subject.update_moment(scene_secs, &mut self.moment);
+        self.moment.lighting(lighting);
         true
     }
 }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::sync::{Arc, Mutex};
 
-use frameless::{Answer, Batch, Pose, Request, Size, Surface, Tracer};
+use frameless::{Answer, Batch, Lighting, Pose, Request, Size, Surface, Tracer};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
@@ -127,6 +127,14 @@ impl Tracer for CpuTracer {
         self.shared.idle().push(workspace);
         true
     }
+
+    fn lighting(&mut self, scene_secs: f64, lighting: &mut Lighting) -> bool {
+        let mut workspace = self.shared.take_workspace(scene_secs);
+        self.shared.world.update_moment(scene_secs, &mut workspace.moment);
+        workspace.moment.lighting(lighting);
+        self.shared.idle().push(workspace);
+        true
+    }
 }
 
 impl Shared {
@@ -183,6 +191,7 @@ const UNTRACED: Surface = Surface {
     position: [0.0; 3],
     normal: [0.0; 3],
     albedo: [0.0; 3],
+    direct: [0.0; 3],
     lit: 0,
 };
 

@@ -107,6 +107,7 @@ impl World {
                 position: point.local_position.to_array(),
                 normal: point.local_normal.to_array(),
                 albedo: albedo.to_array(),
+                direct: (albedo * irradiance).to_array(),
                 lit,
             });
             throughput *= mirror * point.base;
@@ -131,20 +132,22 @@ impl World {
         let mut sum = Vec3A::ZERO;
         let mut lit = u32::MAX;
         for (index, light) in moment.lights.iter().enumerate() {
-            let arriving = light.at(point.position);
-            let cos = point.normal.dot(arriving.direction);
-            let is_off = arriving.irradiance == Vec3A::ZERO;
+            let arriving = light.at(point.position.to_array());
+            let to_light = Vec3A::from(arriving.direction);
+            let irradiance = Vec3A::from(arriving.irradiance);
+            let cos = point.normal.dot(to_light);
+            let is_off = irradiance == Vec3A::ZERO;
             if cos <= 0.0 || (is_off && !settings.surfaces) {
                 probe.note(|| format!("  light {index}: faces away or gives nothing"));
                 continue;
             }
-            let (direction, t_max) = match arriving.position {
-                Some(position) => (position - point.shadow_origin, 1.0),
-                None => (arriving.direction, f32::INFINITY),
+            let (direction, t_max) = match light.position {
+                Some(position) => (Vec3A::from(position) - point.shadow_origin, 1.0),
+                None => (to_light, f32::INFINITY),
             };
             let shadow_ray = Ray { origin: point.shadow_origin, direction };
             let is_shadowed = moment.targets(self).occluded(&shadow_ray, t_max, stack);
-            let contribution = arriving.irradiance * (cos * FRAC_1_PI);
+            let contribution = irradiance * (cos * FRAC_1_PI);
             probe.note(|| {
                 let state = if is_shadowed { "in shadow, would give" } else { "visible, gives" };
                 format!("  light {index}: {state} {contribution:.5} per albedo (cos {cos:.4})")
@@ -173,6 +176,7 @@ fn sky_surface(ray: &Ray) -> Surface {
         position: ray.direction.to_array(),
         normal: (-ray.direction).to_array(),
         albedo: [0.0; 3],
+        direct: [0.0; 3],
         lit: u32::MAX,
     }
 }

@@ -1,10 +1,12 @@
 //! The world at one time.
 
-use frameless::{Pose, Size};
+use frameless::{Light, Lighting, Placement, Pose, Size};
 use frameless_scene::{Geometry, State, View};
 
+use glam::Affine3A;
+
 use crate::camera::Camera;
-use crate::lights::{LightNow, lights_now};
+use crate::lights::lights_now;
 use crate::top::{Placed, Shape, Targets, Top};
 use crate::world::World;
 
@@ -16,7 +18,7 @@ pub struct Moment {
     state: State,
     placed: Vec<Placed>,
     top: Top,
-    pub(crate) lights: Vec<LightNow>,
+    pub(crate) lights: Vec<Light>,
 }
 
 impl Moment {
@@ -36,12 +38,33 @@ impl Moment {
         pose.deformed.clear();
     }
 
+    /// Fills in the lights, and how every instance stands in the world.
+    pub fn lighting(&self, lighting: &mut Lighting) {
+        lighting.lights.clone_from(&self.lights);
+        lighting.world_from_object.clear();
+        let placements =
+            self.placed.iter().map(|placed| Some(placement(&placed.world_from_object)));
+        lighting.world_from_object.extend(placements);
+    }
+
     pub(crate) fn placed(&self, instance: u32) -> &Placed {
         &self.placed[instance as usize]
     }
 
     pub(crate) fn targets<'a>(&'a self, world: &'a World) -> Targets<'a> {
         Targets { top: &self.top, placed: &self.placed, blas: &world.blas, isa: world.isa }
+    }
+}
+
+fn placement(world_from_object: &Affine3A) -> Placement {
+    let Affine3A { matrix3: m, translation } = world_from_object;
+    let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
+    // The columns of the inverse transpose, but for a factor that keeps the side.
+    let side = m.determinant().signum();
+    let [u, v, w] = [side * y.cross(z), side * z.cross(x), side * x.cross(y)];
+    Placement {
+        point: std::array::from_fn(|k| [x[k], y[k], z[k], translation[k]]),
+        normal: std::array::from_fn(|k| [u[k], v[k], w[k]]),
     }
 }
 

@@ -1,6 +1,6 @@
 //! How often each pixel is traced: a renderer that counts its answers.
 
-use frameless::{Answer, Batch, Pose, Size, Time, Tracer};
+use frameless::{Answer, Batch, Lighting, Pose, Size, Time, Tracer};
 
 /// Samples per second of every pixel, smoothed over about a second.
 ///
@@ -103,6 +103,10 @@ impl<T: Tracer> Tracer for Counted<T> {
 
     fn pose(&mut self, scene_secs: f64, size: Size, pose: &mut Pose) -> bool {
         self.tracer.pose(scene_secs, size, pose)
+    }
+
+    fn lighting(&mut self, scene_secs: f64, lighting: &mut Lighting) -> bool {
+        self.tracer.lighting(scene_secs, lighting)
     }
 }
 

@@ -3,8 +3,8 @@
 use thiserror::Error;
 
 use crate::{
-    Answer, Batch, Canvas, Clock, Display, Hold, Kept, Observation, Pose, Reconstruction, Refresh,
-    Request, Sampler, Size, Surface, Time, Timeline, Tracer,
+    Answer, Batch, Canvas, Clock, Display, Hold, Kept, Lighting, Observation, Pose, Reconstruction,
+    Refresh, Request, Sampler, Size, Surface, Time, Timeline, Tracer,
 };
 
 /// Everything that runs a frameless picture: a clock, a sampler, a renderer, and the canvas between them.
@@ -25,6 +25,7 @@ pub struct Engine<T> {
     changes: Vec<f32>,
     observations: Vec<Observation>,
     pose: Pose,
+    lighting: Lighting,
     picture: Vec<[f32; 3]>,
 }
 
@@ -133,6 +134,7 @@ impl<T: Tracer> Engine<T> {
             changes: Vec::new(),
             observations: Vec::new(),
             pose: Pose::default(),
+            lighting: Lighting::default(),
             picture: Vec::new(),
         }
     }
@@ -288,8 +290,11 @@ impl<T: Tracer> Engine<T> {
     pub fn refresh(&mut self, now: Time) -> &[[f32; 3]] {
         let (secs, size) = (self.timeline.scene_secs(now), self.canvas.size());
         let pose = self.tracer.pose(secs, size, &mut self.pose).then_some(&self.pose);
+        let lighting =
+            self.reconstruction.wants_lighting() && self.tracer.lighting(secs, &mut self.lighting);
+        let lighting = lighting.then_some(&self.lighting);
         let rates = self.sampler.rates();
-        let refresh = Refresh { now, pose, display: &self.display, rates };
+        let refresh = Refresh { now, pose, lighting, display: &self.display, rates };
         self.reconstruction.refresh(&refresh, &mut self.canvas, &mut self.picture);
         &self.picture
     }

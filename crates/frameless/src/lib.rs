@@ -28,6 +28,7 @@ mod canvas;
 mod clock;
 mod display;
 mod engine;
+mod lighting;
 mod pose;
 mod rates;
 mod reconstruction;
@@ -49,6 +50,7 @@ pub use sample::{Answer, Batch, Request, Size, Surface};
 pub use sampler::{Insight, Observation, Sampler};
 pub use samplers::{Adaptive, Change, DEFAULT_TILE, DEFAULT_W_D, Permutation, Random, SamplerKind};
 
+pub use lighting::{Arriving, Light, Lighting, Placement};
 pub use pose::{Deformed, Pose, Projected, Projection};
 pub use tracer::{Function, Tracer};
 

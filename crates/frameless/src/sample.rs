@@ -124,6 +124,9 @@ pub struct Surface {
     pub normal: [f32; 3],
     /// Linear RGB albedo: what part of the light is reflected diffusely.
     pub albedo: [f32; 3],
+    /// Linear RGB: the part of the sample's colour that can be shaded again with other lights, as [`crate::Lighting`] says; black
+    /// if the renderer cannot tell.
+    pub direct: [f32; 3],
     /// Bit i: light i reaches the point, or was not tested because the surface faces away from it.
     pub lit: u32,
 }

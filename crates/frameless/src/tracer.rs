@@ -1,6 +1,6 @@
 //! The renderer's side of the contract.
 
-use crate::{Answer, Batch, Pose, Size};
+use crate::{Answer, Batch, Lighting, Pose, Size};
 
 /// A renderer: takes batches of pixels, gives their colours back, now or later.
 ///
@@ -36,6 +36,12 @@ pub trait Tracer {
     fn pose(&mut self, _scene_secs: f64, _size: Size, _pose: &mut Pose) -> bool {
         false
     }
+
+    /// Fill in the lights at `scene_secs`, for a renderer whose surfaces have albedo, normal and direct light; stored samples
+    /// are then shaded again as lights change. Returns whether it can; the default cannot.
+    fn lighting(&mut self, _scene_secs: f64, _lighting: &mut Lighting) -> bool {
+        false
+    }
 }
 
 impl<T: Tracer + ?Sized> Tracer for Box<T> {
@@ -49,6 +55,10 @@ impl<T: Tracer + ?Sized> Tracer for Box<T> {
 
     fn pose(&mut self, scene_secs: f64, size: Size, pose: &mut Pose) -> bool {
         (**self).pose(scene_secs, size, pose)
+    }
+
+    fn lighting(&mut self, scene_secs: f64, lighting: &mut Lighting) -> bool {
+        (**self).lighting(scene_secs, lighting)
     }
 }
 

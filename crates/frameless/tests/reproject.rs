@@ -60,7 +60,18 @@ impl World {
             (0, [x, y, 0.0], [0.0, texture, 0.5 * texture])
         };
         let normal = [0.0, 0.0, 1.0];
-        (rgb, Surface { object, primitive: 0, position, normal, albedo: rgb, lit: 1 })
+        (
+            rgb,
+            Surface {
+                object,
+                primitive: 0,
+                position,
+                normal,
+                albedo: rgb,
+                direct: [0.0; 3],
+                lit: 1,
+            },
+        )
     }
 
     fn pose(&self, secs: f64) -> Pose {

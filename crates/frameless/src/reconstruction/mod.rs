@@ -9,7 +9,7 @@ pub use filter::Filter;
 pub use hold::{Hold, hold, hold_into};
 pub use reproject::Reproject;
 
-use crate::{Canvas, Display, Pose, Rates, Request, Size, Surface, Time};
+use crate::{Canvas, Display, Lighting, Pose, Rates, Request, Size, Surface, Time};
 
 /// The samples of one answer, in its order, just written to the canvas.
 #[derive(Clone, Copy)]
@@ -35,6 +35,8 @@ pub struct Refresh<'a> {
     pub now: Time,
     /// Where everything is then; `None` if the renderer cannot tell.
     pub pose: Option<&'a Pose>,
+    /// The lights then; `None` if the renderer cannot tell, or nobody wants to know.
+    pub lighting: Option<&'a Lighting>,
     /// How radiance is shown.
     pub display: &'a Display,
     /// How fast each part of the picture changes; `None` if nobody has learned it.
@@ -50,6 +52,11 @@ pub trait Reconstruction: Send {
     /// Where in its pixel each chosen sample is best taken at `now`; may move requests to neighbouring pixels.
     fn aim(&self, now: Time, canvas: &Canvas, requests: &mut [Request]) {
         let _ = (now, canvas, requests);
+    }
+
+    /// Whether [`Refresh::lighting`] is of use.
+    fn wants_lighting(&self) -> bool {
+        false
     }
 
     /// The picture, display-referred sRGB in [0, 1], row-major. Also tells the canvas what the pixels show by then.

@@ -9,6 +9,8 @@ mod aim;
 mod fill;
 mod gather;
 mod holes;
+mod packed;
+mod relight;
 mod residual;
 mod store;
 mod warp;
@@ -28,6 +30,7 @@ pub struct Reproject {
     store: Store,
     warp: warp::Warp,
     gather: gather::Gather,
+    relight: relight::Relight,
     /// The picture of the last refresh, and what is needed to find a surface in it.
     shown: Vec<[f32; 3]>,
     shown_at: Time,
@@ -51,6 +54,7 @@ impl Reproject {
             store: Store::new(Size::new(1, 1), cells),
             warp: Default::default(),
             gather: Default::default(),
+            relight: Default::default(),
             shown: Vec::new(),
             shown_at: Time::ZERO,
             poses: Default::default(),
@@ -76,7 +80,7 @@ impl Reconstruction for Reproject {
         self.fit(kept.size);
         for i in 0..kept.requests.len() {
             let mut sample = store::Sample::new(kept, i, display);
-            let found = self.residual(&sample, display.encode(kept.old[i]));
+            let found = self.residual(&sample, display.encode(kept.old[i]), display);
             sample.depth = found.depth;
             self.store.insert(&sample, found.outdated);
             changes.push(found.change);
@@ -89,6 +93,10 @@ impl Reconstruction for Reproject {
                 self.aim_one(now, request);
             }
         }
+    }
+
+    fn wants_lighting(&self) -> bool {
+        self.options.relight
     }
 
     fn refresh(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas, picture: &mut Vec<[f32; 3]>) {
@@ -105,6 +113,9 @@ impl Reconstruction for Reproject {
         let at_rest = self.refreshes >= 2 && self.poses[0] == self.poses[1];
         if !at_rest {
             self.warp.run(&mut self.store, &self.poses[0]);
+        }
+        if let Some(lighting) = refresh.lighting {
+            self.relight.run(&mut self.store, lighting, refresh.display);
         }
         let rates = refresh.rates.unwrap_or_else(|| {
             self.no_rates.get_or_insert_with(|| Rates::new(TileGrid::new(size, 8)))

@@ -6,6 +6,7 @@
 
 use super::Reproject;
 use super::store::{SCREEN, Sample};
+use crate::Display;
 
 /// What a sample found.
 pub(super) struct Found {
@@ -27,10 +28,9 @@ const RAW: f32 = 0.1;
 const OUTDATED: f32 = 0.0025;
 
 impl Reproject {
-    pub(super) fn residual(&self, sample: &Sample, old: [f32; 3]) -> Found {
-        let rgb = sample.rgb;
+    pub(super) fn residual(&self, sample: &Sample, old: [f32; 3], display: &Display) -> Found {
         if self.refreshes == 0 || sample.object == SCREEN {
-            let change = squared(rgb, old);
+            let change = squared(sample.rgb, old);
             return Found { change, outdated: change > 3.0 * OUTDATED, depth: f32::INFINITY };
         }
         let size = self.store.layout.size;
@@ -43,6 +43,8 @@ impl Reproject {
         let Some(px) = then.map(|there| there.px).filter(inside) else {
             return Found { change: UNKNOWN, outdated: true, depth };
         };
+        let rgb =
+            if self.options.relight { self.relight.as_shown(sample, display) } else { sample.rgb };
         let raw = squared(rgb, self.nearest(px)).min(squared(rgb, self.bilinear(px)));
         let outdated = raw > 3.0 * OUTDATED;
         let moving = self.refreshes >= 2

@@ -4,6 +4,7 @@
 //! one cell of every pixel, one after the other; every sub-grid has a border of one empty cell, so that loops over neighbours
 //! need no bounds.
 
+use super::packed::{PackedAlbedo, PackedNormal};
 use crate::{Display, Kept, Size, Surface, Time};
 
 /// The object number of samples of which the renderer could not say what they hit: they stay where they are in the picture.
@@ -19,6 +20,17 @@ pub(super) struct Anchor {
     pub(super) primitive: u32,
 }
 
+/// What shading a sample again takes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Shade {
+    /// Linear RGB without the light that comes straight from the lights.
+    pub(super) rest: [f32; 3],
+    pub(super) normal: PackedNormal,
+    pub(super) albedo: PackedAlbedo,
+    /// As in [`Surface`].
+    pub(super) lit: u32,
+}
+
 /// One sample.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sample {
@@ -30,6 +42,7 @@ pub(super) struct Sample {
     pub(super) tick: Tick,
     pub(super) object: u32,
     pub(super) anchor: Anchor,
+    pub(super) shade: Shade,
 }
 
 /// A time in units of 2¹⁴ ns (16 µs), modulo 2³² of them (19 hours).
@@ -60,6 +73,17 @@ impl Tick {
     }
 }
 
+impl Shade {
+    fn new(surface: &Surface, rgb: [f32; 3]) -> Shade {
+        Shade {
+            rest: std::array::from_fn(|k| rgb[k] - surface.direct[k]),
+            normal: PackedNormal::new(surface.normal),
+            albedo: PackedAlbedo::new(surface.albedo),
+            lit: surface.lit,
+        }
+    }
+}
+
 impl Sample {
     pub(super) fn new(kept: &Kept<'_>, i: usize, display: &Display) -> Sample {
         let (object, anchor) = match kept.surfaces.get(i) {
@@ -73,6 +97,7 @@ impl Sample {
             tick: Tick::of(kept.now),
             object,
             anchor,
+            shade: kept.surfaces.get(i).map_or_else(Shade::default, |s| Shade::new(s, kept.new[i])),
         }
     }
 
@@ -83,7 +108,15 @@ impl Sample {
 
 pub(super) fn surface(object: u32, anchor: &Anchor) -> Surface {
     let Anchor { position, primitive } = *anchor;
-    Surface { object, primitive, position, normal: [0.0; 3], albedo: [0.0; 3], lit: 0 }
+    Surface {
+        object,
+        primitive,
+        position,
+        normal: [0.0; 3],
+        albedo: [0.0; 3],
+        direct: [0.0; 3],
+        lit: 0,
+    }
 }
 
 /// How the cells lie in memory.
@@ -159,6 +192,7 @@ pub(super) struct Store {
     pub(super) tick: Vec<u32>,
     pub(super) object: Vec<u32>,
     pub(super) anchor: Vec<Anchor>,
+    pub(super) shade: Vec<Shade>,
 }
 
 impl Store {
@@ -172,6 +206,7 @@ impl Store {
             tick: vec![0; layout.len()],
             object: vec![EMPTY; layout.len()],
             anchor: vec![Anchor::default(); layout.len()],
+            shade: vec![Shade::default(); layout.len()],
             layout,
         }
     }
@@ -184,6 +219,7 @@ impl Store {
             tick: Tick(self.tick[i]),
             object: self.object[i],
             anchor: self.anchor[i],
+            shade: self.shade[i],
         }
     }
 
@@ -194,6 +230,7 @@ impl Store {
         self.tick[i] = sample.tick.0;
         self.object[i] = sample.object;
         self.anchor[i] = sample.anchor;
+        self.shade[i] = sample.shade;
     }
 
     #[inline(always)]

@@ -96,6 +96,7 @@ impl Warp {
             next.tick[cell] = store.tick[from];
             next.object[cell] = store.object[from];
             next.anchor[cell] = store.anchor[from];
+            next.shade[cell] = store.shade[from];
             next.px[0][cell] = self.px[0][from];
             next.px[1][cell] = self.px[1][from];
             next.depth[cell] = self.depth[from];

@@ -1,0 +1,79 @@
+//! Stored surfaces, shaded again with the present lights.
+//!
+//! ```text
+//! colour now = (colour then − direct then) + albedo / π · Σ_i lit_i · E_i · max(0, n · l_i)
+//! ```
+//!
+//! The rest, `colour then − direct then`, is stored with the sample: what the object emits and reflects, and ambient light. Shadows
+//! stay as they were until the pixel is traced again.
+
+use super::store::{EMPTY, Sample, Shade, Store, surface};
+use crate::{Display, Lighting, Surface};
+
+/// The lights under which the stored samples are shown.
+#[derive(Default)]
+pub(super) struct Relight {
+    shown: Lighting,
+    display: Display,
+    /// Objects that look different under the new lights, or stand differently in them.
+    changed: Vec<bool>,
+}
+
+impl Shade {
+    /// Linear colour of a surface under `lighting`; `None` if its object cannot be shaded again.
+    fn relit(&self, surface: &Surface, lighting: &Lighting) -> Option<[f32; 3]> {
+        let surface = Surface {
+            normal: self.normal.unpack(),
+            albedo: self.albedo.unpack(),
+            lit: self.lit,
+            ..*surface
+        };
+        let direct = lighting.direct(&surface)?;
+        Some(std::array::from_fn(|k| (self.rest[k] + direct[k]).max(0.0)))
+    }
+}
+
+impl Relight {
+    /// What the sample would have looked like at the last refresh, as far as lights are concerned. Display-referred.
+    pub(super) fn as_shown(&self, sample: &Sample, display: &Display) -> [f32; 3] {
+        let relit = sample.shade.relit(&sample.surface(), &self.shown);
+        relit.map_or(sample.rgb, |rgb| display.encode(rgb))
+    }
+
+    /// Shows all samples of objects for which something has changed under the new lights. Returns whether any has.
+    pub(super) fn run(
+        &mut self,
+        store: &mut Store,
+        lighting: &Lighting,
+        display: &Display,
+    ) -> bool {
+        let everything = lighting.lights != self.shown.lights || *display != self.display;
+        let then = &self.shown.world_from_object;
+        let placements = lighting.world_from_object.iter().enumerate();
+        self.changed.clear();
+        self.changed.extend(
+            placements.map(|(object, place)| everything || then.get(object) != Some(place)),
+        );
+        let any = self.changed.contains(&true);
+        if any {
+            self.shown.clone_from(lighting);
+            self.display = *display;
+            self.shade(store);
+        }
+        any
+    }
+
+    fn shade(&self, store: &mut Store) {
+        for i in 0..store.layout.len() {
+            let object = store.object[i];
+            if object == EMPTY || !self.changed.get(object as usize).is_some_and(|&c| c) {
+                continue;
+            }
+            let surface = surface(object, &store.anchor[i]);
+            if let Some(rgb) = store.shade[i].relit(&surface, &self.shown) {
+                let rgb = self.display.encode(rgb);
+                (0..3).for_each(|k| store.rgb[k][i] = rgb[k]);
+            }
+        }
+    }
+}
