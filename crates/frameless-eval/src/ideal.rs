@@ -171,7 +171,7 @@ fn stratified(pixel: u32) -> impl Iterator<Item = Request> {
     (0..SAMPLES_AT_REST).map(move |i| {
         let mut place = |square: u32| (square as f32 + rng.unit_f32()) / ROWS_AT_REST as f32 - 0.5;
         let x = place(i % ROWS_AT_REST);
-        Request { pixel, offset: [x, place(i / ROWS_AT_REST)] }
+        Request { pixel, offset: [x, place(i / ROWS_AT_REST)], sample_index: i }
     })
 }
 
@@ -196,7 +196,7 @@ mod tests {
     #[test]
     fn each_square_of_a_pixel_has_one_sample() {
         let mut counts = [0; SAMPLES_AT_REST as usize];
-        for Request { pixel, offset } in stratified(7) {
+        for Request { pixel, offset, .. } in stratified(7) {
             assert_eq!(pixel, 7);
             let [x, y] = offset.map(|o| ((o + 0.5) * ROWS_AT_REST as f32) as usize);
             counts[y * ROWS_AT_REST as usize + x] += 1;

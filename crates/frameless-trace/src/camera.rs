@@ -118,8 +118,8 @@ mod tests {
             * Affine3A::from_rotation_y(-std::f32::consts::FRAC_PI_2);
         let size = Size::new(4, 2);
         let camera = Camera::new(&View { world_from_camera, projection }, size);
-        let top_left = Request { pixel: 0, offset: [-0.5, -0.5] };
-        let centre = Request { pixel: size.index(2, 1), offset: [-0.5, -0.5] };
+        let top_left = Request { pixel: 0, offset: [-0.5, -0.5], sample_index: 0 };
+        let centre = Request { pixel: size.index(2, 1), offset: [-0.5, -0.5], sample_index: 0 };
         [camera.ray(&top_left), camera.ray(&centre)]
     }
 
@@ -137,7 +137,7 @@ mod tests {
         {
             let camera = Camera::new(&View { world_from_camera, projection }, size);
             for pixel in [0, 1234, size.index(320, 180), size.index(639, 359)] {
-                let request = Request { pixel, offset: [0.25, -0.125] };
+                let request = Request { pixel, offset: [0.25, -0.125], sample_index: 0 };
                 let (ray, expected) = (camera.ray(&request), request.position_px(size));
                 let point = ray.origin + 7.0 * ray.direction;
                 let local = world_from_object.inverse().transform_point3a(point);

@@ -279,6 +279,7 @@ fn answers(world: &Arc<World>, threads: usize) -> Vec<Answer> {
             .map(|_| Request {
                 pixel: rng.below(SIZE.pixels() as u32),
                 offset: [rng.unit_f32() - 0.5; 2],
+                sample_index: 0,
             })
             .collect();
         let (now, scene_secs) = (Time(id), id as f64 * 0.01);

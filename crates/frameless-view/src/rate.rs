@@ -101,6 +101,10 @@ impl<T: Tracer> Tracer for Counted<T> {
         Some(answer)
     }
 
+    fn is_noisy(&self) -> bool {
+        self.tracer.is_noisy()
+    }
+
     fn pose(&mut self, scene_secs: f64, size: Size, pose: &mut Pose) -> bool {
         self.tracer.pose(scene_secs, size, pose)
     }

@@ -13,6 +13,8 @@ pub struct Canvas {
     holes: Vec<u32>,
     updates: u64,
     holes_at: Time,
+    samples: Vec<u16>,
+    samples_wanted: u16,
 }
 
 impl Canvas {
@@ -40,6 +42,8 @@ impl Canvas {
             holes: Vec::new(),
             updates: 0,
             holes_at: Time::ZERO,
+            samples: vec![0; size.pixels()],
+            samples_wanted: 0,
         }
     }
 
@@ -59,7 +63,8 @@ impl Canvas {
         &self.rgb
     }
 
-    /// When each pixel was traced last, row-major; [`Time::ZERO`]: never.
+    /// When each pixel was traced last, row-major; [`Time::ZERO`]: never. Samples that are added to others of a pixel at rest
+    /// do not count: they do not tell whether anything has changed.
     pub fn time(&self) -> &[Time] {
         &self.time
     }
@@ -81,6 +86,16 @@ impl Canvas {
         !self.known[pixel as usize] || self.time[pixel as usize] <= self.holes_at
     }
 
+    /// Of how many samples each pixel shows the mean, row-major; 0 where the picture does not rest.
+    pub fn samples(&self) -> &[u16] {
+        &self.samples
+    }
+
+    /// How many samples a pixel at rest is to have; 0: they are not added up.
+    pub fn samples_wanted(&self) -> u16 {
+        self.samples_wanted
+    }
+
     /// How often a reconstruction has said anew what the pixels show: then all of [`Canvas::time`], [`Canvas::known`] and
     /// [`Canvas::holes`] may have changed without a sample.
     pub fn updates(&self) -> u64 {
@@ -100,6 +115,19 @@ impl Canvas {
         }
         std::mem::swap(&mut self.holes, holes);
         self.updates += 1;
+    }
+
+    /// Of how many samples each pixel shows the mean from now on, and how many are wanted.
+    pub(crate) fn set_samples(&mut self, wanted: u16, count: impl Fn(usize) -> u16) {
+        self.samples_wanted = wanted;
+        self.samples.iter_mut().enumerate().for_each(|(pixel, samples)| *samples = count(pixel));
+    }
+
+    /// A sample has been added to those of a pixel at rest; returns the time and colour of the one at its centre, which stays.
+    pub(crate) fn refine(&mut self, pixel: u32) -> (Time, [f32; 3]) {
+        let i = pixel as usize;
+        self.samples[i] = self.samples[i].saturating_add(1);
+        (self.time[i], self.rgb[i])
     }
 
     /// Write a sample; returns the time and colour that it replaces.
@@ -136,6 +164,8 @@ impl Canvas {
             holes: coarse_to_fine(size),
             updates: self.updates + 1,
             holes_at: self.holes_at,
+            samples: vec![0; size.pixels()],
+            samples_wanted: 0,
         }
     }
 }

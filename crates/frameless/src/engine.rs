@@ -3,8 +3,8 @@
 use thiserror::Error;
 
 use crate::{
-    Answer, Batch, Canvas, Clock, Display, Hold, Kept, Lighting, Observation, Pose, Reconstruction,
-    Refresh, Request, Sampler, Size, Surface, Time, Timeline, Tracer,
+    Answer, Batch, Canvas, Clock, Display, Findings, Hold, Kept, Lighting, Observation, Pose,
+    Reconstruction, Refresh, Request, Sampler, Size, Surface, Time, Timeline, Tracer,
 };
 
 /// Everything that runs a frameless picture: a clock, a sampler, a renderer, and the canvas between them.
@@ -22,7 +22,7 @@ pub struct Engine<T> {
     // Reused from batch to batch.
     spare_requests: Vec<Request>,
     replaced: Replaced,
-    changes: Vec<f32>,
+    findings: Findings,
     observations: Vec<Observation>,
     pose: Pose,
     lighting: Lighting,
@@ -131,7 +131,7 @@ impl<T: Tracer> Engine<T> {
             counters: Counters::default(),
             spare_requests: Vec::new(),
             replaced: Replaced::default(),
-            changes: Vec::new(),
+            findings: Findings::default(),
             observations: Vec::new(),
             pose: Pose::default(),
             lighting: Lighting::default(),
@@ -260,7 +260,12 @@ impl<T: Tracer> Engine<T> {
                 continue;
             }
             let known = self.canvas.known()[pixel as usize];
-            let (previous, old) = self.canvas.replace(pixel, answer.now, rgb);
+            let is_refinement =
+                request.sample_index > 0 && self.canvas.samples()[pixel as usize] > 0;
+            let (previous, old) = match is_refinement {
+                true => self.canvas.refine(pixel),
+                false => self.canvas.replace(pixel, answer.now, rgb),
+            };
             self.replaced.requests.push(*request);
             self.replaced.before.push((previous, known));
             self.replaced.old.push(old);
@@ -273,13 +278,17 @@ impl<T: Tracer> Engine<T> {
     /// Tells the sampler what the samples just kept have changed. Returns how many they are.
     fn observe(&mut self, now: Time) -> usize {
         let Replaced { requests, before, old, new, surfaces } = &self.replaced;
-        let kept = Kept { now, size: self.canvas.size(), requests, new, old, surfaces };
-        self.changes.clear();
-        self.reconstruction.keep(&kept, &self.display, &mut self.changes);
+        let (size, is_noisy) = (self.canvas.size(), self.tracer.is_noisy());
+        let kept = Kept { now, size, requests, new, old, surfaces, is_noisy };
+        self.findings.changes.clear();
+        self.findings.refinements.clear();
+        self.reconstruction.keep(&kept, &self.display, &mut self.findings);
         self.observations.clear();
-        let samples = requests.iter().zip(before).zip(&self.changes);
-        self.observations.extend(samples.map(|((request, &(previous, known)), &change)| {
-            Observation { pixel: request.pixel, now, previous, known, change }
+        let refinements = &self.findings.refinements;
+        let samples = requests.iter().zip(before).zip(&self.findings.changes).enumerate();
+        self.observations.extend(samples.map(|(i, ((request, &(previous, known)), &change))| {
+            let refinement = refinements.get(i).copied().flatten();
+            Observation { pixel: request.pixel, now, previous, known, change, refinement }
         }));
         self.sampler.observe(&self.canvas, &self.observations);
         self.counters.kept += self.observations.len() as u64;
@@ -294,7 +303,8 @@ impl<T: Tracer> Engine<T> {
             self.reconstruction.wants_lighting() && self.tracer.lighting(secs, &mut self.lighting);
         let lighting = lighting.then_some(&self.lighting);
         let rates = self.sampler.rates();
-        let refresh = Refresh { now, pose, lighting, display: &self.display, rates };
+        let (display, is_noisy) = (&self.display, self.tracer.is_noisy());
+        let refresh = Refresh { now, pose, lighting, display, is_noisy, rates };
         self.reconstruction.refresh(&refresh, &mut self.canvas, &mut self.picture);
         &self.picture
     }

@@ -47,7 +47,7 @@ pub use time::Time;
 
 pub use sample::{Answer, Batch, Request, Size, Surface};
 
-pub use sampler::{Insight, Observation, Sampler};
+pub use sampler::{Insight, Observation, Refinement, Sampler};
 pub use samplers::{Adaptive, Change, DEFAULT_TILE, DEFAULT_W_D, Permutation, Random, SamplerKind};
 
 pub use lighting::{Arriving, Light, Lighting, Placement};
@@ -63,8 +63,8 @@ pub use timeline::Timeline;
 pub use display::Display;
 pub use rates::Rates;
 pub use reconstruction::{
-    Filter, Hold, Kept, Reconstruction, ReconstructionKind, Refresh, Reproject, ReprojectOptions,
-    hold, hold_into,
+    Filter, Findings, Hold, Kept, Reconstruction, ReconstructionKind, Refresh, Reproject,
+    ReprojectOptions, hold, hold_into,
 };
 
 pub use rng::Rng;

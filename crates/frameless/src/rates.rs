@@ -82,7 +82,8 @@ mod tests {
         let mut rates = Rates::new(TileGrid::new(Size::new(8, 8), 8));
         let mut observe = |change: f32| {
             let (now, previous) = (Time::from_secs(1.0), Time::from_secs(0.9));
-            let observed = Observation { pixel: 0, now, previous, known: true, change };
+            let observed =
+                Observation { pixel: 0, now, previous, known: true, change, refinement: None };
             rates.observe(0, &observed, 1.0);
             rates.of_pixel(63)
         };

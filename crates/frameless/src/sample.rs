@@ -48,12 +48,25 @@ pub struct Request {
     /// Where in the pixel the ray goes, in pixels from the pixel's **centre**: x to the right, y down,
     /// each in [−0.5, 0.5). `[0, 0]` is the centre.
     pub offset: [f32; 2],
+    /// Number of the sample in the pixel's own sequence. A renderer that uses random numbers makes them of this and the pixel, so that
+    /// the same request of an unchanged scene has the same answer; see [`crate::Tracer::is_noisy`].
+    pub sample_index: u32,
 }
 
 impl Request {
-    /// A ray through the pixel's centre.
+    /// A ray through the pixel's centre: number 0 of its sequence.
     pub fn centre(pixel: u32) -> Request {
-        Request { pixel, offset: [0.0; 2] }
+        Request { pixel, offset: [0.0; 2], sample_index: 0 }
+    }
+
+    /// Number `sample_index` of the pixel's sequence: an additive recurrence with the plastic number (Roberts 2018, "The
+    /// unreasonable effectiveness of quasirandom sequences"), whose number 0 is the centre.
+    pub fn in_sequence(pixel: u32, sample_index: u32) -> Request {
+        const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
+        let offset =
+            STEPS.map(|step| ((0.5 + f64::from(sample_index) * step).fract() - 0.5) as f32);
+        // Rounding must not reach the next pixel.
+        Request { pixel, offset: offset.map(|o| o.min(0.499_999)), sample_index }
     }
 
     /// Image position of the ray, in pixels from the picture's top-left **corner**; the centre of the

@@ -16,6 +16,18 @@ pub struct Observation {
     /// d = Σₖ (newₖ − oldₖ)² over display-referred sRGB in [0, 1], old being what the picture showed there: between 0 (nothing
     /// changed) and 3.
     pub change: f32,
+    /// For a sample that was added to others of a pixel at rest; its `change` is 0, since it says nothing of change.
+    pub refinement: Option<Refinement>,
+}
+
+/// What a sample told that was added to others of a pixel at rest, taken elsewhere in the pixel or with other random numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refinement {
+    /// An estimate of the variance of the pixel's samples: Σₖ (newₖ − meanₖ)² · n/(n + 1) over display-referred sRGB, for a mean of
+    /// n samples.
+    pub deviation: f32,
+    /// Whether it is so far off that the pixel had better be looked at again.
+    pub suspect: bool,
 }
 
 /// Chooses the pixels that are traced next.

@@ -31,6 +31,13 @@ pub trait Tracer {
     /// still be answered; `None` then means that nothing more will come.
     fn collect(&mut self, wait: bool) -> Option<Answer>;
 
+    /// Whether colours have noise, as path tracing's. Then the same request of an unchanged scene, its
+    /// [`sample_index`](crate::Request::sample_index) included, must still have the same answer: that is how change is told from
+    /// noise. The default has none.
+    fn is_noisy(&self) -> bool {
+        false
+    }
+
     /// Fill in where everything is in a picture of `size` at `scene_secs`, for a renderer that returns surfaces and can
     /// tell; its samples are then carried along as things move. Returns whether it can; the default cannot.
     fn pose(&mut self, _scene_secs: f64, _size: Size, _pose: &mut Pose) -> bool {
@@ -51,6 +58,10 @@ impl<T: Tracer + ?Sized> Tracer for Box<T> {
 
     fn collect(&mut self, wait: bool) -> Option<Answer> {
         (**self).collect(wait)
+    }
+
+    fn is_noisy(&self) -> bool {
+        (**self).is_noisy()
     }
 
     fn pose(&mut self, scene_secs: f64, size: Size, pose: &mut Pose) -> bool {

@@ -271,7 +271,14 @@ fn observations_before_the_first_choice_are_harmless() {
     let mut sampler = Change::new(0.9, 16, 1);
     sampler.observe(
         &Canvas::new(Size::new(4, 4)),
-        &[Observation { pixel: 3, now: Time(5), previous: Time(2), known: true, change: 1.0 }],
+        &[Observation {
+            pixel: 3,
+            now: Time(5),
+            previous: Time(2),
+            known: true,
+            change: 1.0,
+            refinement: None,
+        }],
     );
     let mut requests = Vec::new();
     sampler.choose(Time(9), &Canvas::new(Size::new(8, 8)), 10, &mut requests);

@@ -70,7 +70,7 @@ pub(super) fn requests_of(low: Size, full: Size) -> Vec<Request> {
         let (i, j) = low.xy(pixel);
         let (x, dx) = place(i, low.width, full.width);
         let (y, dy) = place(j, low.height, full.height);
-        Request { pixel: full.index(x, y), offset: [dx, dy] }
+        Request { pixel: full.index(x, y), offset: [dx, dy], sample_index: 0 }
     };
     (0..low.pixels() as u32).map(request).collect()
 }

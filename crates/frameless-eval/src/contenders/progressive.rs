@@ -82,6 +82,7 @@ impl<'a> Progressive<'a> {
                 } else {
                     [self.rng.unit_f32() - 0.5, self.rng.unit_f32() - 0.5]
                 },
+                sample_index: (i / n) as u32,
             })
             .collect();
         let rgb = self.arena.subject.trace(self.drawn_secs, self.arena.size, &requests);

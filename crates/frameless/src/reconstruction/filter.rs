@@ -8,6 +8,7 @@
 //! with v the learned rate of change of the tile ([`Rates`]) and s its spatial contrast. Where nothing changes (v = 0) that is
 //! `hold`, and so it is with a sampler that learns no rates; where samples are old it leans on younger neighbours. The radius follows from where both terms meet, √(v·age/s).
 
+use super::Findings;
 use super::contrast::tile_contrast;
 use crate::{Canvas, Display, Kept, Rates, Reconstruction, Refresh};
 
@@ -24,8 +25,8 @@ pub struct Filter {
 const LEAST_ERROR: f32 = 1e-4;
 
 impl Reconstruction for Filter {
-    fn keep(&mut self, kept: &Kept<'_>, display: &Display, changes: &mut Vec<f32>) {
-        changes.extend(display.changes(kept.new, kept.old, &mut self.squares));
+    fn keep(&mut self, kept: &Kept<'_>, display: &Display, findings: &mut Findings) {
+        findings.changes.extend(display.changes(kept.new, kept.old, &mut self.squares));
     }
 
     fn refresh(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas, picture: &mut Vec<[f32; 3]>) {

@@ -1,5 +1,6 @@
 //! Reconstruction `hold`: every pixel shows its newest sample until the next one.
 
+use super::Findings;
 use crate::{Canvas, Display, Kept, Reconstruction, Refresh};
 
 /// See the module.
@@ -9,8 +10,8 @@ pub struct Hold {
 }
 
 impl Reconstruction for Hold {
-    fn keep(&mut self, kept: &Kept<'_>, display: &Display, changes: &mut Vec<f32>) {
-        changes.extend(display.changes(kept.new, kept.old, &mut self.squares));
+    fn keep(&mut self, kept: &Kept<'_>, display: &Display, findings: &mut Findings) {
+        findings.changes.extend(display.changes(kept.new, kept.old, &mut self.squares));
     }
 
     fn refresh(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas, picture: &mut Vec<[f32; 3]>) {

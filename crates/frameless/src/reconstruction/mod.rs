@@ -9,7 +9,7 @@ pub use filter::Filter;
 pub use hold::{Hold, hold, hold_into};
 pub use reproject::Reproject;
 
-use crate::{Canvas, Display, Lighting, Pose, Rates, Request, Size, Surface, Time};
+use crate::{Canvas, Display, Lighting, Pose, Rates, Refinement, Request, Size, Surface, Time};
 
 /// The samples of one answer, in its order, just written to the canvas.
 #[derive(Clone, Copy)]
@@ -26,6 +26,17 @@ pub struct Kept<'a> {
     pub old: &'a [[f32; 3]],
     /// What was hit; empty if the renderer cannot tell.
     pub surfaces: &'a [Surface],
+    /// See [`crate::Tracer::is_noisy`].
+    pub is_noisy: bool,
+}
+
+/// What the samples of one answer told, one entry each, in its order.
+#[derive(Clone, Debug, Default)]
+pub struct Findings {
+    /// d = Σₖ (newₖ − shownₖ)² over display-referred sRGB: how far each was from what the picture showed there.
+    pub changes: Vec<f32>,
+    /// What those told that were added to others of a pixel at rest. May be empty: none was.
+    pub refinements: Vec<Option<Refinement>>,
 }
 
 /// What a picture is made for.
@@ -39,15 +50,16 @@ pub struct Refresh<'a> {
     pub lighting: Option<&'a Lighting>,
     /// How radiance is shown.
     pub display: &'a Display,
+    /// See [`crate::Tracer::is_noisy`].
+    pub is_noisy: bool,
     /// How fast each part of the picture changes; `None` if nobody has learned it.
     pub rates: Option<&'a Rates>,
 }
 
 /// Makes pictures of samples.
 pub trait Reconstruction: Send {
-    /// Takes samples, and says how far each was from what the picture showed there: d = Σₖ (newₖ − shownₖ)² over
-    /// display-referred sRGB. `changes` is empty before.
-    fn keep(&mut self, kept: &Kept<'_>, display: &Display, changes: &mut Vec<f32>);
+    /// Takes samples, and says what they told. `findings` are empty before.
+    fn keep(&mut self, kept: &Kept<'_>, display: &Display, findings: &mut Findings);
 
     /// Where in its pixel each chosen sample is best taken at `now`; may move requests to neighbouring pixels.
     fn aim(&self, now: Time, canvas: &Canvas, requests: &mut [Request]) {

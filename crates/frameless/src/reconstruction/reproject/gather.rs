@@ -43,8 +43,6 @@ pub(super) struct Gather {
 
 /// Below this expected error a sample is taken as it is.
 const EXACT: f32 = 2e-5;
-/// A sample so near to the centre is as good as one at the centre: rounding of its projected position.
-const CENTRAL_PX: f32 = 0.002;
 
 impl Gather {
     /// Per pixel.
@@ -52,18 +50,13 @@ impl Gather {
         &self.holes
     }
 
-    /// After a picture in which nothing moves: samples beside their pixel's centre are to be traced again, where the
-    /// picture will rest.
-    pub(super) fn find_off_centre(&mut self, store: &Store) {
+    /// After a picture: samples beside their pixel's centre are to be traced again, where their object `rests`.
+    pub(super) fn find_off_centre(&mut self, store: &Store, rests: impl Fn(u32) -> bool) {
         let size = store.layout.size;
         for (pixel, hole) in self.holes.iter_mut().enumerate().filter(|(_, h)| **h == Hole::No) {
             let (x, y) = size.xy(pixel as u32);
-            let is_central = |&i: &usize| {
-                let (dx, dy) =
-                    (store.px[0][i] - (x as f32 + 0.5), store.px[1][i] - (y as f32 + 0.5));
-                store.object[i] != EMPTY && dx * dx + dy * dy < CENTRAL_PX * CENTRAL_PX
-            };
-            if !store.of_pixel(x, y).any(|i| is_central(&i)) {
+            let may_rest = store.newest(x, y).is_some_and(|cell| rests(store.object[cell]));
+            if may_rest && store.central(x, y).is_none() {
                 *hole = Hole::OffCentre;
             }
         }

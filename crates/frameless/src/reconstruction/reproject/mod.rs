@@ -12,6 +12,7 @@ mod holes;
 mod packed;
 mod relight;
 mod residual;
+mod settle;
 mod store;
 mod warp;
 
@@ -19,7 +20,9 @@ use super::ReprojectOptions;
 use super::contrast::tile_contrast;
 use crate::rates::Rates;
 use crate::tile::TileGrid;
-use crate::{Canvas, Display, Kept, Pose, Reconstruction, Refresh, Request, Size, Time};
+use crate::{
+    Canvas, Display, Findings, Kept, Pose, Reconstruction, Refinement, Refresh, Request, Size, Time,
+};
 use store::{Store, Tick};
 
 /// See the module.
@@ -31,6 +34,7 @@ pub struct Reproject {
     warp: warp::Warp,
     gather: gather::Gather,
     relight: relight::Relight,
+    settled: settle::Settled,
     /// The picture of the last refresh, and what is needed to find a surface in it.
     shown: Vec<[f32; 3]>,
     shown_at: Time,
@@ -55,6 +59,7 @@ impl Reproject {
             warp: Default::default(),
             gather: Default::default(),
             relight: Default::default(),
+            settled: Default::default(),
             shown: Vec::new(),
             shown_at: Time::ZERO,
             poses: Default::default(),
@@ -71,19 +76,49 @@ impl Reproject {
             self.store = Store::new(size, self.cells);
             self.refreshes = 0;
             self.shown.clear();
+            self.settled.fit(size);
         }
+    }
+
+    /// Adds a sample to those of its pixel, if it is meant to be and the pixel is at rest.
+    fn refine(&mut self, kept: &Kept<'_>, i: usize, display: &Display) -> Option<Refinement> {
+        let (request, rgb) = (kept.requests[i], kept.new[i]);
+        if request.sample_index == 0 || self.settled.count(request.pixel) == 0 {
+            return None;
+        }
+        let mut refinement = self.settled.add(request.pixel, rgb, display, kept.is_noisy);
+        if refinement.suspect {
+            let (x, y) = kept.size.xy(request.pixel);
+            let centre = [x as f32 + 0.5, y as f32 + 0.5];
+            let age_secs = self
+                .store
+                .newest(x, y)
+                .map_or(0.0, |cell| Tick(self.store.tick[cell]).secs_until(Tick::of(kept.now)));
+            refinement.suspect = age_secs > LONG_SINCE_SECS
+                && self.beyond_range(centre, display.encode(rgb)) > 3.0 * residual::OUTDATED;
+        }
+        Some(refinement)
     }
 }
 
+/// A suspect pixel whose centre was traced later than this before is not looked at again: it shows something finer than a pixel.
+const LONG_SINCE_SECS: f32 = 0.05;
+
 impl Reconstruction for Reproject {
-    fn keep(&mut self, kept: &Kept<'_>, display: &Display, changes: &mut Vec<f32>) {
+    fn keep(&mut self, kept: &Kept<'_>, display: &Display, findings: &mut Findings) {
         self.fit(kept.size);
         for i in 0..kept.requests.len() {
+            if let Some(refinement) = self.refine(kept, i, display) {
+                findings.changes.push(0.0);
+                findings.refinements.resize(i, None);
+                findings.refinements.push(Some(refinement));
+                continue;
+            }
             let mut sample = store::Sample::new(kept, i, display);
-            let found = self.residual(&sample, display.encode(kept.old[i]), display);
+            let found = self.residual(&sample, kept, i, display);
             sample.depth = found.depth;
             self.store.insert(&sample, found.outdated);
-            changes.push(found.change);
+            findings.changes.push(found.change);
         }
     }
 
@@ -111,6 +146,12 @@ impl Reconstruction for Reproject {
         self.refreshes += 1;
         self.shown_at = refresh.now;
         let at_rest = self.refreshes >= 2 && self.poses[0] == self.poses[1];
+        // Nothing is known to move before the second refresh.
+        let before = &self.poses[usize::from(self.refreshes >= 2)];
+        self.settled.find_moved([&self.poses[0], before]);
+        if refresh.is_noisy {
+            self.settled.hand_over(&mut self.store, refresh.display);
+        }
         if !at_rest {
             self.warp.run(&mut self.store, &self.poses[0]);
         }
@@ -126,8 +167,15 @@ impl Reconstruction for Reproject {
         tile_contrast(&self.shown, &rates.grid, &mut self.contrast);
         picture.clone_from(&self.shown);
         self.gather.run(&self.store, refresh.now, rates, &self.contrast, picture);
-        if at_rest {
-            self.gather.find_off_centre(&self.store);
+        self.gather.find_off_centre(&self.store, |object| self.settled.rests(object));
+        let wanted = match refresh.is_noisy {
+            true => settle::MOST_SAMPLES,
+            false if self.options.antialias => settle::SAMPLES_WITHOUT_NOISE,
+            false => 0,
+        };
+        if wanted > 0 {
+            let Reproject { settled, store, gather, relight, .. } = &mut *self;
+            settled.show(store, gather.holes(), relight, refresh, picture);
         }
         self.shown.clone_from(picture);
         holes::order(self.gather.holes(), size, &mut self.holes);
@@ -139,5 +187,6 @@ impl Reconstruction for Reproject {
             let newest = store.newest(x, y).map(|i| Tick(store.tick[i]).time(refresh.now));
             (newest.unwrap_or(Time::ZERO), is_known)
         });
+        canvas.set_samples(wanted, |pixel| self.settled.count(pixel as u32));
     }
 }

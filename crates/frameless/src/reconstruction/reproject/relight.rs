@@ -4,8 +4,7 @@
 //! colour now = (colour then − direct then) + albedo / π · Σ_i lit_i · E_i · max(0, n · l_i)
 //! ```
 //!
-//! The rest, `colour then − direct then`, is stored with the sample: what the object emits and reflects, and ambient light. Shadows
-//! stay as they were until the pixel is traced again.
+//! What the object emits and reflects, and ambient light, stay as they were until the pixel is traced again; so do shadows.
 
 use super::store::{EMPTY, Sample, Shade, Store, surface};
 use crate::{Display, Lighting, Surface};
@@ -29,7 +28,7 @@ impl Shade {
             ..*surface
         };
         let direct = lighting.direct(&surface)?;
-        Some(std::array::from_fn(|k| (self.rest[k] + direct[k]).max(0.0)))
+        Some(std::array::from_fn(|k| (self.rgb[k] - self.direct[k] + direct[k]).max(0.0)))
     }
 }
 
@@ -38,6 +37,18 @@ impl Relight {
     pub(super) fn as_shown(&self, sample: &Sample, display: &Display) -> [f32; 3] {
         let relit = sample.shade.relit(&sample.surface(), &self.shown);
         relit.map_or(sample.rgb, |rgb| display.encode(rgb))
+    }
+
+    /// Linear colour of the sample in a cell as it is shown.
+    pub(super) fn linear(&self, store: &Store, cell: usize) -> [f32; 3] {
+        let (surface, shade) =
+            (surface(store.object[cell], &store.anchor[cell]), &store.shade[cell]);
+        shade.relit(&surface, &self.shown).unwrap_or(shade.rgb)
+    }
+
+    /// Whether an object's samples were shaded again at the last refresh.
+    pub(super) fn has_changed(&self, object: u32) -> bool {
+        self.changed.get(object as usize).is_some_and(|&changed| changed)
     }
 
     /// Shows all samples of objects for which something has changed under the new lights. Returns whether any has.
@@ -66,7 +77,7 @@ impl Relight {
     fn shade(&self, store: &mut Store) {
         for i in 0..store.layout.len() {
             let object = store.object[i];
-            if object == EMPTY || !self.changed.get(object as usize).is_some_and(|&c| c) {
+            if object == EMPTY || !self.has_changed(object) {
                 continue;
             }
             let surface = surface(object, &store.anchor[i]);

@@ -6,7 +6,7 @@
 
 use super::Reproject;
 use super::store::{SCREEN, Sample};
-use crate::Display;
+use crate::{Display, Kept, Request};
 
 /// What a sample found.
 pub(super) struct Found {
@@ -25,10 +25,44 @@ const AT_REST_PX: f32 = 0.05;
 /// How much the raw difference of moving surfaces counts beside the distance to the range of colours.
 const RAW: f32 = 0.1;
 /// As in front propagation: mean squared difference per channel.
-const OUTDATED: f32 = 0.0025;
+pub(super) const OUTDATED: f32 = 0.0025;
+
+/// Where rays differ, so many variances of the renderer's noise are no change.
+const NOISE: f32 = 4.0;
 
 impl Reproject {
-    pub(super) fn residual(&self, sample: &Sample, old: [f32; 3], display: &Display) -> Found {
+    /// What sample `i` of those kept found. Takes it up if its pixel is at rest.
+    pub(super) fn residual(
+        &mut self,
+        sample: &Sample,
+        kept: &Kept<'_>,
+        i: usize,
+        display: &Display,
+    ) -> Found {
+        let rgb =
+            if self.options.relight { self.relight.as_shown(sample, display) } else { sample.rgb };
+        let found = self.against_shown(sample, rgb, display.encode(kept.old[i]));
+        let request = kept.requests[i];
+        let (x, y) = kept.size.xy(request.pixel);
+        let central = self.store.central(x, y);
+        if request == Request::centre(request.pixel)
+            && self.settled.count(request.pixel) > 0
+            && let Some(cell) = central
+        {
+            // The same ray as before: all that differs is change.
+            let before = std::array::from_fn(|k| self.store.rgb[k][cell]);
+            let change = squared(rgb, before);
+            self.settled.verify(request.pixel, kept.new[i], change, kept.is_noisy);
+            return Found { change, outdated: change > 3.0 * OUTDATED, ..found };
+        }
+        if kept.is_noisy {
+            let change = (found.change - NOISE * self.settled.noise(request.pixel)).max(0.0);
+            return Found { change, outdated: change > 3.0 * OUTDATED, ..found };
+        }
+        found
+    }
+
+    fn against_shown(&self, sample: &Sample, rgb: [f32; 3], old: [f32; 3]) -> Found {
         if self.refreshes == 0 || sample.object == SCREEN {
             let change = squared(sample.rgb, old);
             return Found { change, outdated: change > 3.0 * OUTDATED, depth: f32::INFINITY };
@@ -43,8 +77,6 @@ impl Reproject {
         let Some(px) = then.map(|there| there.px).filter(inside) else {
             return Found { change: UNKNOWN, outdated: true, depth };
         };
-        let rgb =
-            if self.options.relight { self.relight.as_shown(sample, display) } else { sample.rgb };
         let raw = squared(rgb, self.nearest(px)).min(squared(rgb, self.bilinear(px)));
         let outdated = raw > 3.0 * OUTDATED;
         let moving = self.refreshes >= 2
@@ -80,7 +112,7 @@ impl Reproject {
     }
 
     /// Squared distance to the range of the colours in the 3×3 pixels around.
-    fn beyond_range(&self, px: [f32; 2], rgb: [f32; 3]) -> f32 {
+    pub(super) fn beyond_range(&self, px: [f32; 2], rgb: [f32; 3]) -> f32 {
         let (x, y) = (px[0] as i32, px[1] as i32);
         let (mut low, mut high) = ([f32::MAX; 3], [f32::MIN; 3]);
         for ny in y - 1..=y + 1 {

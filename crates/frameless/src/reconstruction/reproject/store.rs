@@ -12,6 +12,9 @@ pub(super) const SCREEN: u32 = Surface::SKY - 1;
 /// The object number of an empty cell.
 pub(super) const EMPTY: u32 = Surface::SKY - 2;
 
+/// A sample so near to the centre is as good as one at the centre: rounding of its projected position.
+const CENTRAL_PX: f32 = 0.002;
+
 /// A point on an object, as in [`Surface`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
@@ -23,11 +26,12 @@ pub(super) struct Anchor {
 /// What shading a sample again takes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Shade {
-    /// Linear RGB without the light that comes straight from the lights.
-    pub(super) rest: [f32; 3],
+    /// Linear RGB as traced.
+    pub(super) rgb: [f32; 3],
+    /// As in [`Surface`].
+    pub(super) direct: [f32; 3],
     pub(super) normal: PackedNormal,
     pub(super) albedo: PackedAlbedo,
-    /// As in [`Surface`].
     pub(super) lit: u32,
 }
 
@@ -74,9 +78,11 @@ impl Tick {
 }
 
 impl Shade {
-    fn new(surface: &Surface, rgb: [f32; 3]) -> Shade {
+    fn new(surface: Option<&Surface>, rgb: [f32; 3]) -> Shade {
+        let Some(surface) = surface else { return Shade { rgb, ..Shade::default() } };
         Shade {
-            rest: std::array::from_fn(|k| rgb[k] - surface.direct[k]),
+            rgb,
+            direct: surface.direct,
             normal: PackedNormal::new(surface.normal),
             albedo: PackedAlbedo::new(surface.albedo),
             lit: surface.lit,
@@ -97,7 +103,7 @@ impl Sample {
             tick: Tick::of(kept.now),
             object,
             anchor,
-            shade: kept.surfaces.get(i).map_or_else(Shade::default, |s| Shade::new(s, kept.new[i])),
+            shade: Shade::new(kept.surfaces.get(i), kept.new[i]),
         }
     }
 
@@ -233,6 +239,13 @@ impl Store {
         self.shade[i] = sample.shade;
     }
 
+    /// Gives the sample in a cell another linear colour.
+    pub(super) fn recolour(&mut self, i: usize, rgb: [f32; 3], display: &Display) {
+        self.shade[i] = Shade { rgb, ..self.shade[i] };
+        let encoded = display.encode(rgb);
+        (0..3).for_each(|k| self.rgb[k][i] = encoded[k]);
+    }
+
     #[inline(always)]
     pub(super) fn is_empty(&self, i: usize) -> bool {
         self.object[i] == EMPTY
@@ -253,6 +266,16 @@ impl Store {
         samples.reduce(|newest, i| {
             if Tick(self.tick[i]).is_later_than(Tick(self.tick[newest])) { i } else { newest }
         })
+    }
+
+    /// The cell of a sample at a pixel's centre.
+    #[inline(always)]
+    pub(super) fn central(&self, x: u32, y: u32) -> Option<usize> {
+        let is_central = |&i: &usize| {
+            let (dx, dy) = (self.px[0][i] - (x as f32 + 0.5), self.px[1][i] - (y as f32 + 0.5));
+            !self.is_empty(i) && dx * dx + dy * dy < CENTRAL_PX * CENTRAL_PX
+        };
+        self.of_pixel(x, y).find(is_central)
     }
 
     /// Puts a sample into its cell. `outdated`: the pixel's others show something that is no longer there.

@@ -45,6 +45,14 @@ impl Front {
         }
     }
 
+    /// Queue a pixel that had better be looked at again.
+    pub(crate) fn suspect(&mut self, observed: &Observation) {
+        let queued = &mut self.queued[observed.pixel as usize];
+        if self.queue.len() < self.capacity && !std::mem::replace(queued, true) {
+            self.queue.push_back((observed.pixel, Time(u64::MAX)));
+        }
+    }
+
     /// The next pixel that has not been traced since it was queued.
     pub(crate) fn next(&mut self, canvas: &Canvas) -> Option<u32> {
         while let Some((pixel, found)) = self.queue.pop_front() {
@@ -69,7 +77,7 @@ mod tests {
     use super::*;
 
     fn found(pixel: u32, now: Time, change: f32) -> Observation {
-        Observation { pixel, now, previous: Time::ZERO, known: true, change }
+        Observation { pixel, now, previous: Time::ZERO, known: true, change, refinement: None }
     }
 
     #[test]

@@ -2,23 +2,26 @@
 //!
 //! A batch is filled in this order:
 //!
-//! 1. **Holes** ([`Canvas::holes`]), at most 40 %: pixels of which nothing is known.
+//! 1. **Holes** ([`Canvas::holes`]), pixels of which nothing is known: at most 40 %, or the part of the picture that they are.
 //! 2. **Fronts** ([`front`]), at most 60 % of the rest: neighbours of samples that found a change. Gated off where most of
 //!    the picture changes, since there is nothing to follow then.
-//! 3. **Tiles** ([`credit`]): by √v, with an even share for all.
+//! 3. **Refinement** ([`refine`]): more samples for what is at rest, as the control has it.
+//! 4. **Tiles** ([`credit`]): by √v, with an even share for all.
 
 mod credit;
 mod front;
+mod refine;
 
 use crate::rates::Rates;
 use crate::tile::TileGrid;
 use crate::{Canvas, Insight, Observation, Request, Rng, Sampler, Time};
 use credit::Credit;
 use front::Front;
+use refine::Refine;
 
 /// Side of a tile, as a power of two: 8 pixels.
 const TILE_BITS: u32 = 3;
-/// The largest part of a batch that holes get.
+/// The largest part of a batch that holes get, unless they are more than this part of the picture.
 const HOLE_SHARE: f32 = 0.4;
 /// The largest part of what holes leave that fronts get.
 const FRONT_SHARE: f32 = 0.6;
@@ -43,6 +46,7 @@ struct State {
     rates: Rates,
     credit: Credit,
     front: Front,
+    refine: Refine,
     front_share: f32,
     updates: u64,
     next_hole: usize,
@@ -72,6 +76,7 @@ impl State {
         State {
             generation: canvas.generation(),
             credit: Credit::new(grid.len(), TILE_BITS, rng),
+            refine: Refine::new(&grid, TILE_BITS, rng),
             rates: Rates::new(grid),
             front: Front::new(canvas.size()),
             front_share: FRONT_SHARE,
@@ -88,10 +93,6 @@ impl State {
     }
 
     fn choose_holes(&mut self, canvas: &Canvas, most: usize, requests: &mut Vec<Request>) {
-        if self.updates != canvas.updates() {
-            self.updates = canvas.updates();
-            self.next_hole = 0;
-        }
         let end = requests.len() + most;
         while requests.len() < end {
             let Some(&pixel) = canvas.holes().get(self.next_hole) else { return };
@@ -125,11 +126,23 @@ impl Sampler for Adaptive {
         }
         let state = self.state.get_or_insert_with(|| State::new(canvas, &mut self.rng));
         let start = requests.len();
-        state.choose_holes(canvas, (HOLE_SHARE * count as f32) as usize, requests);
+        if state.updates != canvas.updates() {
+            state.updates = canvas.updates();
+            state.next_hole = 0;
+            state.refine.look(canvas, &state.rates);
+        }
+        let unknown = canvas.holes().len() as f32 / canvas.size().pixels() as f32;
+        let hole_share = HOLE_SHARE.max(unknown);
+        state.choose_holes(canvas, (hole_share * count as f32) as usize, requests);
         state.choose_fronts(canvas, count - (requests.len() - start), requests);
-        let rest = (count - (requests.len() - start)) as f32;
+        let State { credit, refine, rates, why, owed, .. } = state;
+        let left = (count - (requests.len() - start)) as f32;
+        let spatial = left * (1.0 - refine.temporal_part(self.temporal));
+        if spatial > 0.0 {
+            refine.draw(canvas, &rates.grid, spatial, |request| requests.push(request));
+        }
         let before = requests.len();
-        let State { credit, rates, why, owed, .. } = state;
+        let rest = count as f32 - (before - start) as f32;
         credit.draw(now, canvas, rates, rest + *owed, |pixel| {
             why[pixel as usize] = Why::Tile;
             requests.push(Request::centre(pixel));
@@ -143,11 +156,18 @@ impl Sampler for Adaptive {
             return;
         };
         for observed in observations {
+            let tile = state.rates.grid.tile_of(observed.pixel);
+            if let Some(refinement) = &observed.refinement {
+                state.refine.observe(tile, refinement);
+                if refinement.suspect {
+                    state.front.suspect(observed);
+                }
+                continue;
+            }
             let why = state.why[observed.pixel as usize];
             if !observed.known || why == Why::Hole {
                 continue;
             }
-            let tile = state.rates.grid.tile_of(observed.pixel);
             let weight = if why == Why::Front { 0.5 } else { 1.0 };
             state.rates.observe(tile, observed, weight);
             if state.front_share > 0.0 {
@@ -229,7 +249,7 @@ mod tests {
                 counts[pixel as usize] += 1;
                 let (previous, _) = canvas.replace(pixel, now, [0.0; 3]);
                 let change = if is_restless(pixel) { 0.002 } else { 0.0 };
-                Observation { pixel, now, previous, known: true, change }
+                Observation { pixel, now, previous, known: true, change, refinement: None }
             };
             let observations: Vec<Observation> = requests.iter().map(observe).collect();
             sampler.observe(&canvas, &observations);

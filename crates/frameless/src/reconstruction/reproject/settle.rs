@@ -1,0 +1,267 @@
+//! Pixels at rest: their samples add up.
+//!
+//! ```text
+//! μ_n = (1/n) Σ x_j                    linear RGB; x_1 is the sample at the centre, the others lie elsewhere in the pixel
+//! σ²  = (1/(n−1)) Σ |x_j − μ_{j−1}|² (j−1)/j      in display-referred sRGB, summed over the channels (Welford 1962)
+//! ```
+//!
+//! A pixel is at rest while its sample lies at its centre and neither its object nor one beside it moves. The sample at the
+//! centre is kept apart: traced again, with the same random numbers, it is the same unless something has changed, however
+//! noisy the renderer is and whatever else the pixel's other samples see. Where it has changed the pixel, and no other, begins
+//! anew; a renderer with noise goes on with as many samples as are off by noise as much as by the change,
+//!
+//! ```text
+//! n ← min(n, σ² / δ²)                  δ² the squared change of the sample at the centre
+//! ```
+
+use super::gather::Hole;
+use super::relight::Relight;
+use super::store::{EMPTY, SCREEN, Store};
+use crate::tile::TileGrid;
+use crate::{Display, Pose, Refinement, Refresh, Size, Surface};
+
+/// Per pixel what its samples add up to; nothing where it is not at rest.
+#[derive(Default)]
+pub(super) struct Settled {
+    sum: Vec<[f32; 3]>,
+    count: Vec<u16>,
+    /// (n − 1) σ².
+    spread: Vec<f32>,
+    grid: Option<TileGrid>,
+    /// Per tile: the variance of a pixel's samples.
+    noise: Vec<f32>,
+    /// Object numbers that have moved since the last refresh.
+    moved: Vec<bool>,
+    sky_moved: bool,
+}
+
+/// Samples that add up in a pixel where the renderer has no noise: more cannot be told apart in 8 bits.
+pub(super) const SAMPLES_WITHOUT_NOISE: u16 = 64;
+/// The most that are counted.
+pub(super) const MOST_SAMPLES: u16 = u16::MAX;
+
+/// A sample at the centre that differs by no more (Σ over the channels) is the same.
+const SAME: f32 = 1e-6;
+/// Before much is known of a pixel it is thought to spread by this (Σ over the channels): 9 % of the range.
+const FIRST_SPREAD: f32 = 0.025;
+/// How much of a tile's noise each sample renews.
+const NOISE_MEMORY: f32 = 1.0 / 64.0;
+const TILE: u32 = 8;
+/// A sample this many standard deviations off, squared, makes a pixel suspect.
+const SUSPECT: f32 = 9.0;
+
+impl Settled {
+    pub(super) fn fit(&mut self, size: Size) {
+        let grid = TileGrid::new(size, TILE);
+        self.sum = vec![[0.0; 3]; size.pixels()];
+        self.count = vec![0; size.pixels()];
+        self.spread = vec![0.0; size.pixels()];
+        self.noise = vec![0.0; grid.len()];
+        self.grid = Some(grid);
+    }
+
+    /// Of how many samples a pixel shows the mean; 0 where it is not at rest.
+    pub(super) fn count(&self, pixel: u32) -> u16 {
+        self.count.get(pixel as usize).copied().unwrap_or(0)
+    }
+
+    /// Variance of the samples of a pixel in the tile, Σ over the channels, as far as it is known.
+    pub(super) fn noise(&self, pixel: u32) -> f32 {
+        self.grid.as_ref().map_or(0.0, |grid| self.noise[grid.tile_of(pixel)])
+    }
+
+    pub(super) fn begin(&mut self, pixel: usize, rgb: [f32; 3]) {
+        (self.sum[pixel], self.count[pixel], self.spread[pixel]) = (rgb, 1, 0.0);
+    }
+
+    /// Linear mean of the pixel's samples.
+    pub(super) fn mean(&self, pixel: usize) -> [f32; 3] {
+        let per_count = 1.0 / f32::from(self.count[pixel]);
+        self.sum[pixel].map(|c| c * per_count)
+    }
+
+    /// One more sample of a pixel at rest.
+    pub(super) fn add(
+        &mut self,
+        pixel: u32,
+        rgb: [f32; 3],
+        display: &Display,
+        is_noisy: bool,
+    ) -> Refinement {
+        let tile = self.grid.as_ref().map(|grid| grid.tile_of(pixel));
+        let pixel = pixel as usize;
+        if !is_noisy && self.count[pixel] >= SAMPLES_WITHOUT_NOISE {
+            return Refinement { deviation: 0.0, suspect: false };
+        }
+        let n = f32::from(self.count[pixel]);
+        let deviation = display.change(rgb, self.mean(pixel)) * n / (n + 1.0);
+        let suspect = deviation > SUSPECT * (self.spread[pixel] + FIRST_SPREAD) / n;
+        self.spread[pixel] += deviation;
+        if let Some(tile) = tile {
+            self.noise[tile] += NOISE_MEMORY * (deviation - self.noise[tile]);
+        }
+        if self.count[pixel] == MOST_SAMPLES {
+            self.keep_only(pixel, MOST_SAMPLES / 2);
+        }
+        (0..3).for_each(|k| self.sum[pixel][k] += rgb[k]);
+        self.count[pixel] += 1;
+        Refinement { deviation, suspect }
+    }
+
+    /// The sample at the centre has changed by `change` (Σ over the channels) to the linear `rgb`.
+    pub(super) fn verify(&mut self, pixel: u32, rgb: [f32; 3], change: f32, is_noisy: bool) {
+        if change <= SAME {
+            return;
+        }
+        let pixel = pixel as usize;
+        let n = self.count[pixel];
+        let variance = self.spread[pixel] / (f32::from(n) - 1.0).max(1.0);
+        let as_good = if is_noisy { (variance / change) as u16 } else { 0 };
+        if as_good <= 1 {
+            self.begin(pixel, rgb);
+        } else if as_good < n {
+            self.keep_only(pixel, as_good);
+        }
+    }
+
+    fn keep_only(&mut self, pixel: usize, count: u16) {
+        let part = f32::from(count) / f32::from(self.count[pixel]);
+        self.sum[pixel] = self.sum[pixel].map(|c| c * part);
+        self.spread[pixel] *= part;
+        self.count[pixel] = count;
+    }
+
+    /// What has moved between two refreshes.
+    pub(super) fn find_moved(&mut self, [now, before]: [&Pose; 2]) {
+        let deformed = |pose: &Pose, object: usize| pose.deformed.get(object).cloned().flatten();
+        self.moved.clear();
+        self.moved.extend(now.picture_from_object.iter().enumerate().map(
+            |(object, projection)| {
+                before.picture_from_object.get(object) != Some(projection)
+                    || deformed(now, object) != deformed(before, object)
+            },
+        ));
+        self.sky_moved = now.picture_from_sky != before.picture_from_sky;
+    }
+
+    pub(super) fn rests(&self, object: u32) -> bool {
+        match object {
+            SCREEN | EMPTY => true,
+            Surface::SKY => !self.sky_moved,
+            object => self.moved.get(object as usize).is_some_and(|&moved| !moved),
+        }
+    }
+
+    /// Samples that are about to be carried away take their pixel's mean with them.
+    pub(super) fn hand_over(&mut self, store: &mut Store, display: &Display) {
+        for pixel in 0..self.count.len() {
+            if self.count[pixel] > 1 {
+                let (x, y) = store.layout.size.xy(pixel as u32);
+                let cell = store.central(x, y).filter(|&cell| !self.rests(store.object[cell]));
+                if let Some(cell) = cell {
+                    store.recolour(cell, self.mean(pixel), display);
+                    self.count[pixel] = 0;
+                }
+            }
+        }
+    }
+
+    /// After a picture has been gathered: which pixels are at rest, and what they show.
+    pub(super) fn show(
+        &mut self,
+        store: &mut Store,
+        holes: &[Hole],
+        relight: &Relight,
+        refresh: &Refresh<'_>,
+        picture: &mut [[f32; 3]],
+    ) {
+        let size = store.layout.size;
+        for (pixel, rgb) in picture.iter_mut().enumerate() {
+            let (x, y) = size.xy(pixel as u32);
+            let cell = store.central(x, y).filter(|_| holes[pixel] == Hole::No);
+            match cell.filter(|_| self.all_rest_around(store, x, y)) {
+                Some(cell) if self.count[pixel] == 0 || relight.has_changed(store.object[cell]) => {
+                    self.begin(pixel, relight.linear(store, cell));
+                }
+                Some(_) if self.count[pixel] > 1 => *rgb = refresh.display.encode(self.mean(pixel)),
+                Some(_) => {}
+                None => {
+                    if let Some(cell) = cell.filter(|_| refresh.is_noisy && self.count[pixel] > 1) {
+                        store.recolour(cell, self.mean(pixel), refresh.display);
+                    }
+                    self.count[pixel] = 0;
+                }
+            }
+        }
+    }
+
+    /// In the pixel and the eight around it.
+    fn all_rest_around(&self, store: &Store, x: u32, y: u32) -> bool {
+        let Size { width, height } = store.layout.size;
+        (y.saturating_sub(1)..(y + 2).min(height)).all(|ny| {
+            (x.saturating_sub(1)..(x + 2).min(width))
+                .all(|nx| store.of_pixel(nx, ny).all(|cell| self.rests(store.object[cell])))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settled() -> (Settled, Display) {
+        let mut settled = Settled::default();
+        settled.fit(Size::new(1, 1));
+        (settled, Display::default())
+    }
+
+    #[test]
+    fn samples_add_up_to_their_mean() {
+        let (mut settled, display) = settled();
+        settled.begin(0, [0.1; 3]);
+        for grey in [0.2, 0.3, 0.4] {
+            settled.add(0, [grey; 3], &display, true);
+        }
+        assert_eq!(settled.count(0), 4);
+        assert!((settled.mean(0)[1] - 0.25).abs() < 1e-6);
+        settled.verify(0, [0.1; 3], 0.0, false);
+        assert_eq!(settled.count(0), 4, "the same again");
+        settled.verify(0, [0.9; 3], 0.5, false);
+        assert_eq!((settled.count(0), settled.mean(0)), (1, [0.9; 3]), "begins anew");
+    }
+
+    #[test]
+    fn a_small_change_shortens_a_noisy_mean() {
+        let (mut settled, display) = settled();
+        settled.begin(0, [0.2; 3]);
+        for i in 1..400 {
+            settled.add(0, [if i % 2 == 0 { 0.2 } else { 0.3 }; 3], &display, true);
+        }
+        // σ² is about the squared half of the step, in all channels; a change a tenth of that in size leaves a hundred samples.
+        let step = display.change([0.2; 3], [0.3; 3]);
+        let mean = settled.mean(0);
+        settled.verify(0, [0.2; 3], step / 400.0, true);
+        assert!((80..130).contains(&settled.count(0)), "{}", settled.count(0));
+        assert!((settled.mean(0)[0] - mean[0]).abs() < 1e-6, "the mean itself stays");
+    }
+
+    #[test]
+    fn what_is_far_off_is_suspect() {
+        let (mut settled, display) = settled();
+        settled.begin(0, [0.2; 3]);
+        for _ in 0..20 {
+            assert!(!settled.add(0, [0.21; 3], &display, true).suspect);
+        }
+        assert!(settled.add(0, [0.9; 3], &display, true).suspect);
+    }
+
+    #[test]
+    fn counting_never_overflows() {
+        let (mut settled, display) = settled();
+        settled.begin(0, [0.5; 3]);
+        for _ in 0..2 * u32::from(MOST_SAMPLES) {
+            settled.add(0, [0.5; 3], &display, true);
+        }
+        assert!((settled.mean(0)[0] - 0.5).abs() < 1e-3);
+    }
+}
