@@ -69,6 +69,21 @@ impl F8 {
         }
         M8(mask)
     }
+
+    #[inline(always)]
+    pub(crate) fn store(self, plane: &mut [f32], start: usize) {
+        plane[start..start + 8].copy_from_slice(&self.0);
+    }
+
+    /// Towards zero. Numbers that are not in 0..2³¹ give something.
+    #[inline(always)]
+    pub(crate) fn truncated(self) -> M8 {
+        let mut result = [0; 8];
+        for lane in 0..8 {
+            result[lane] = self.0[lane] as i32 as u32;
+        }
+        M8(result)
+    }
 }
 
 macro_rules! lane_by_lane {
@@ -93,6 +108,16 @@ impl M8 {
     #[inline(always)]
     pub(crate) fn load(plane: &[u32], start: usize) -> M8 {
         M8(plane[start..start + 8].try_into().expect("eight"))
+    }
+
+    #[inline(always)]
+    pub(crate) fn splat(x: u32) -> M8 {
+        M8([x; 8])
+    }
+
+    #[inline(always)]
+    pub(crate) fn store(self, plane: &mut [u32], start: usize) {
+        plane[start..start + 8].copy_from_slice(&self.0);
     }
 
     #[inline(always)]
@@ -129,9 +154,68 @@ impl M8 {
         M8(result)
     }
 
+    /// Sum modulo 2³².
+    #[inline(always)]
+    pub(crate) fn plus(self, other: M8) -> M8 {
+        self.with(other, u32::wrapping_add)
+    }
+
+    /// Product modulo 2³².
+    #[inline(always)]
+    pub(crate) fn times(self, other: M8) -> M8 {
+        self.with(other, u32::wrapping_mul)
+    }
+
+    /// As signed numbers.
+    #[inline(always)]
+    pub(crate) fn less_than(self, other: M8) -> M8 {
+        self.with(other, |a, b| u32::from((a as i32) < b as i32).wrapping_neg())
+    }
+
+    /// As signed numbers.
+    #[inline(always)]
+    pub(crate) fn to_f32(self) -> F8 {
+        let mut result = [0.0; 8];
+        for lane in 0..8 {
+            result[lane] = self.0[lane] as i32 as f32;
+        }
+        F8(result)
+    }
+
+    /// Whether any lane of a mask is set.
+    #[inline(always)]
+    pub(crate) fn any(self) -> bool {
+        self.0.iter().fold(0, |any, lane| any | lane) != 0
+    }
+
+    /// The first lane of a mask that is set.
+    #[inline(always)]
+    pub(crate) fn first(self) -> Option<usize> {
+        let mut bits = 0;
+        for lane in 0..8 {
+            bits |= (self.0[lane] & 1) << lane;
+        }
+        (bits != 0).then(|| bits.trailing_zeros() as usize)
+    }
+
     /// Whether all lanes of a mask are set.
     #[inline(always)]
     pub(crate) fn all(self) -> bool {
         self.0.iter().fold(u32::MAX, |all, lane| all & lane) == u32::MAX
+    }
+}
+
+/// `into[k] = from[index[k]]`.
+///
+/// # Panics
+/// If an index is not in `from`, or there are not as many as places.
+#[inline(always)]
+pub(crate) fn gather<T: Copy>(into: &mut [T], from: &[T], index: &[u32]) {
+    assert_eq!(into.len(), index.len());
+    let largest = index.iter().fold(0, |largest, &i| largest.max(i));
+    assert!((largest as usize) < from.len());
+    for (into, &i) in into.iter_mut().zip(index) {
+        // SAFETY: no index is larger than `largest`, which has just been found to be in `from`.
+        *into = unsafe { *from.get_unchecked(i as usize) };
     }
 }
