@@ -144,6 +144,21 @@ impl M8 {
         self.with(self, |a, _| !a)
     }
 
+    #[inline(always)]
+    pub(crate) fn either(self, other: M8) -> M8 {
+        self.with(other, |a, b| a | b)
+    }
+
+    /// A mask of the first lanes.
+    #[inline(always)]
+    pub(crate) fn first_lanes(lanes: usize) -> M8 {
+        let mut mask = [0; 8];
+        for lane in 0..8 {
+            mask[lane] = u32::from(lane < lanes).wrapping_neg();
+        }
+        M8(mask)
+    }
+
     /// `self` where the mask is set, `other` elsewhere.
     #[inline(always)]
     pub(crate) fn or(self, mask: M8, other: M8) -> M8 {
@@ -158,6 +173,12 @@ impl M8 {
     #[inline(always)]
     pub(crate) fn plus(self, other: M8) -> M8 {
         self.with(other, u32::wrapping_add)
+    }
+
+    /// Difference modulo 2³².
+    #[inline(always)]
+    pub(crate) fn minus(self, other: M8) -> M8 {
+        self.with(other, u32::wrapping_sub)
     }
 
     /// Product modulo 2³².
@@ -188,14 +209,31 @@ impl M8 {
         self.0.iter().fold(0, |any, lane| any | lane) != 0
     }
 
-    /// The first lane of a mask that is set.
+    /// A bit per lane of a mask.
     #[inline(always)]
-    pub(crate) fn first(self) -> Option<usize> {
+    pub(crate) fn bits(self) -> u32 {
         let mut bits = 0;
         for lane in 0..8 {
             bits |= (self.0[lane] & 1) << lane;
         }
+        bits
+    }
+
+    /// The first lane of a mask that is set.
+    #[inline(always)]
+    pub(crate) fn first(self) -> Option<usize> {
+        let bits = self.bits();
         (bits != 0).then(|| bits.trailing_zeros() as usize)
+    }
+
+    /// The lanes of a mask that are set.
+    #[inline(always)]
+    pub(crate) fn for_each(self, mut act: impl FnMut(usize)) {
+        let mut bits = self.bits();
+        while bits != 0 {
+            act(bits.trailing_zeros() as usize);
+            bits &= bits - 1;
+        }
     }
 
     /// Whether all lanes of a mask are set.

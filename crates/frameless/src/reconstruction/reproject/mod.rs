@@ -18,7 +18,7 @@ use super::contrast::tile_contrast;
 use crate::rates::Rates;
 use crate::tile::TileGrid;
 use crate::{Canvas, Display, Kept, Pose, Reconstruction, Refresh, Request, Size, Time};
-use store::{Store, Tick};
+use store::Store;
 
 /// See the module.
 pub struct Reproject {
@@ -113,20 +113,13 @@ impl Reconstruction for Reproject {
             self.shown = canvas.rgb().iter().map(|&rgb| refresh.display.encode(rgb)).collect();
         }
         tile_contrast(&self.shown, &rates.grid, &mut self.contrast);
-        picture.clone_from(&self.shown);
-        self.gather.run(&self.store, refresh.now, rates, &self.contrast, picture);
+        self.gather.run(&self.store, refresh.now, rates, &self.contrast, &self.shown, picture);
         if at_rest {
             self.gather.find_off_centre(&self.store);
         }
         self.shown.clone_from(picture);
-        holes::order(self.gather.holes(), size, &mut self.holes);
-        let (store, gather) = (&self.store, &self.gather);
-        canvas.update(refresh.now, &mut self.holes, |pixel| {
-            let (x, y) = size.xy(pixel as u32);
-            let is_known = !gather.holes()[pixel].is_unknown();
-            let (x, y) = gather.source(pixel).map_or((x, y), |source| size.xy(source));
-            let newest = store.newest(x, y).map(|i| Tick(store.tick[i]).time(refresh.now));
-            (newest.unwrap_or(Time::ZERO), is_known)
-        });
+        let gather::Gather { waiting, time, known, .. } = &mut self.gather;
+        waiting.order(&mut self.holes);
+        canvas.update(refresh.now, &mut self.holes, time, known);
     }
 }
