@@ -11,7 +11,7 @@
 
 use super::fill::{self, AROUND};
 use super::holes::{Hole, Waiting};
-use super::store::{EMPTY, Layout, Store, Tick};
+use super::store::{EMPTY, Layout, Store, TICK_SECS, Tick};
 use crate::rates::Rates;
 use crate::wide::{self, F8, M8};
 use crate::{Size, Time};
@@ -115,11 +115,8 @@ impl wide::Task for OffCentre<'_> {
 /// Of the eight pixels from (x, y) on.
 #[inline(always)]
 fn centres(x: u32, y: u32) -> [F8; 2] {
-    let mut columns = [0.0; 8];
-    for (lane, column) in columns.iter_mut().enumerate() {
-        *column = (x as i32 + lane as i32) as f32 + 0.5;
-    }
-    [F8(columns), F8::splat(y as f32 + 0.5)]
+    let columns = M8::new([0, 1, 2, 3, 4, 5, 6, 7]).plus(M8::splat(x));
+    [columns.to_f32() + F8::splat(0.5), F8::splat(y as f32 + 0.5)]
 }
 
 /// From eight samples to the eight centres.
@@ -233,11 +230,12 @@ impl Blocks<'_> {
             seen.rgb = [0, 1, 2].map(|k| seen.rgb[k].or(exact, mean[k]));
         }
         let start = size.index(x, y) as usize;
+        let (rgb, ticks, are_holes) = (seen.rgb.map(F8::lanes), seen.tick.lanes(), holes.bits());
         for lane in 0..lanes {
             let pixel = start + lane;
-            self.picture[pixel] = seen.rgb.map(|plane| plane.0[lane]);
-            self.gather.known[pixel] = holes.0[lane] == 0;
-            self.gather.time[pixel] = Tick(seen.tick.0[lane]).time(self.now);
+            self.picture[pixel] = [rgb[0][lane], rgb[1][lane], rgb[2][lane]];
+            self.gather.known[pixel] = are_holes & (1 << lane) == 0;
+            self.gather.time[pixel] = Tick(ticks[lane]).time(self.now);
             self.gather.source[pixel] = pixel as u32;
         }
         if holes.any() {
@@ -258,12 +256,13 @@ impl Blocks<'_> {
             // A mask is −1 where it is set.
             known = known.plus(is_known);
         }
+        let (nearest, known) = (nearest.lanes(), known.lanes());
         holes.for_each(|lane| {
             let x = x + lane as u32;
             let pixel = size.index(x, y);
-            let hole = if known.0[lane] as i32 <= -4 { Hole::Small } else { Hole::Large };
+            let hole = if known[lane] as i32 <= -4 { Hole::Small } else { Hole::Large };
             self.gather.waiting.push(pixel, x, y, hole);
-            let Some([dx, dy]) = AROUND.get(nearest.0[lane] as usize) else {
+            let Some([dx, dy]) = AROUND.get(nearest[lane] as usize) else {
                 self.gather.source[pixel as usize] = fill::NOBODY;
                 self.gather.far.push(pixel);
                 return;
@@ -280,12 +279,9 @@ impl Blocks<'_> {
 impl Model<'_> {
     #[inline(always)]
     fn errors(&self, i: usize, eight: &Eight) -> F8 {
-        let ticks = M8::load(&self.store.tick, i);
-        let mut age_secs = [0.0; 8];
-        for (age_secs, tick) in age_secs.iter_mut().zip(ticks.0) {
-            *age_secs = Tick(tick).secs_until(self.now);
-        }
-        eight.v * F8(age_secs) + eight.s * distance2(self.store, i, &eight.centre)
+        let ticks = M8::splat(self.now.0).minus(M8::load(&self.store.tick, i));
+        let age_secs = ticks.to_f32() * F8::splat(TICK_SECS);
+        eight.v * age_secs + eight.s * distance2(self.store, i, &eight.centre)
     }
 
     /// The pixels' own samples with the least expected error.
@@ -335,7 +331,7 @@ impl Model<'_> {
     /// Over the objects' samples: those in the pixel's cells and one further around, for holes in the 3×3 pixels around.
     #[inline(always)]
     fn mean(&self, eight: &Eight, cells: &Cells, object: M8, holes: M8) -> [F8; 3] {
-        let floor = F8::splat(least_error(eight.s.0[0]));
+        let floor = F8::splat(least_error(eight.s.lanes()[0]));
         let zero = F8::splat(0.0);
         let (mut red, mut green, mut blue, mut weights) = (zero, zero, zero, zero);
         for &(offset, is_near) in &cells.around {

@@ -117,7 +117,7 @@ impl wide::Task for Carry<'_> {
             let gone = F8::splat(GONE_PX);
             let mut there = There { px: [gone; 2], depth: gone };
             while let Some(lane) = waiting.first() {
-                let object = objects.0[lane];
+                let object = store.object[start + lane];
                 let same = objects.equals(M8::splat(object));
                 waiting = waiting.and(same.not());
                 let now = carry_eight(store, pose, object, start, anchors);
@@ -164,16 +164,16 @@ fn carry_eight(store: &Store, pose: &Pose, object: u32, start: usize, anchors: [
 }
 
 fn carry_deformed(store: &Store, pose: &Pose, object: u32, start: usize) -> There {
-    let mut there = There { px: [F8::splat(GONE_PX); 2], depth: F8::splat(GONE_PX) };
+    let (mut px, mut depth) = ([[GONE_PX; 8]; 2], [GONE_PX; 8]);
     for lane in 0..8 {
         if store.object[start + lane] == object
             && let Some(now) = pose.project(&surface(object, &store.anchor[start + lane]))
         {
-            (0..2).for_each(|k| there.px[k].0[lane] = now.px[k]);
-            there.depth.0[lane] = now.depth;
+            (0..2).for_each(|k| px[k][lane] = now.px[k]);
+            depth[lane] = now.depth;
         }
     }
-    there
+    There { px: px.map(F8::new), depth: F8::new(depth) }
 }
 
 /// [`Layout::of_px`], eight at a time; [`NOWHERE`] outside.
@@ -209,7 +209,7 @@ fn coordinates(anchors: &[Anchor]) -> [F8; 3] {
             plane[lane] = coordinate;
         }
     }
-    planes.map(F8)
+    planes.map(F8::new)
 }
 
 struct Settle<'a> {
@@ -329,13 +329,9 @@ impl wide::Task for Cracks<'_> {
             for y in 1..size.height as i32 - 1 {
                 for x in (1..size.width as i32 - 1).step_by(8) {
                     let first = layout.of_pixel(x, y) + sub as usize * layout.plane;
-                    let inside = (size.width as i32 - 1 - x) as usize;
-                    let mask = are_covered(store, first, &around);
-                    for lane in 0..8.min(inside) {
-                        if mask.0[lane] != 0 {
-                            covered.push((first + lane) as u32);
-                        }
-                    }
+                    let inside = M8::first_lanes((size.width as i32 - 1 - x) as usize);
+                    let mask = are_covered(store, first, &around).and(inside);
+                    mask.for_each(|lane| covered.push((first + lane) as u32));
                 }
             }
         }
