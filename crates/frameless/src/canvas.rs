@@ -102,25 +102,30 @@ impl Canvas {
         self.updates
     }
 
-    /// What every pixel shows has been found out anew: when it was traced, and where nothing is known.
+    /// What every pixel shows has been found out anew: when it was traced, whether it is known, and who waits to be traced. The
+    /// old vectors are handed back, to be used again.
+    ///
+    /// # Panics
+    /// If `time` and `known` do not have one entry per pixel.
     pub(crate) fn update(
         &mut self,
         now: Time,
         holes: &mut Vec<u32>,
-        mut state: impl FnMut(usize) -> (Time, bool),
+        time: &mut Vec<Time>,
+        known: &mut Vec<bool>,
     ) {
+        assert_eq!((time.len(), known.len()), (self.size.pixels(), self.size.pixels()));
         self.holes_at = now;
-        for (pixel, (time, known)) in self.time.iter_mut().zip(&mut self.known).enumerate() {
-            (*time, *known) = state(pixel);
-        }
         std::mem::swap(&mut self.holes, holes);
+        std::mem::swap(&mut self.time, time);
+        std::mem::swap(&mut self.known, known);
         self.updates += 1;
     }
 
     /// Of how many samples each pixel shows the mean from now on, and how many are wanted.
-    pub(crate) fn set_samples(&mut self, wanted: u16, count: impl Fn(usize) -> u16) {
+    pub(crate) fn set_samples(&mut self, wanted: u16, count: &[u16]) {
         self.samples_wanted = wanted;
-        self.samples.iter_mut().enumerate().for_each(|(pixel, samples)| *samples = count(pixel));
+        self.samples.clone_from_slice(count);
     }
 
     /// A sample has been added to those of a pixel at rest; returns the time and colour of the one at its centre, which stays.

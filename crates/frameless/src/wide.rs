@@ -2,8 +2,16 @@
 //!
 //! The results do not depend on it: every lane does the same IEEE operations, and nothing is contracted.
 #![allow(unsafe_code)]
-// A lane is an index: what the compiler turns into one instruction reads like one.
-#![allow(clippy::needless_range_loop)]
+
+#[cfg(not(target_arch = "x86_64"))]
+mod portable;
+#[cfg(target_arch = "x86_64")]
+mod sse2;
+
+#[cfg(not(target_arch = "x86_64"))]
+use portable::{F4, M4};
+#[cfg(target_arch = "x86_64")]
+use sse2::{F4, M4};
 
 /// A loop to be compiled twice.
 pub(crate) trait Task {
@@ -26,112 +34,215 @@ pub(crate) fn run(task: impl Task) {
 }
 
 /// Eight numbers at a time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct F8(pub(crate) [f32; 8]);
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct F8([F4; 2]);
+
+/// Eight whole numbers at a time; as a mask, all bits of a lane are set or none.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct M8([M4; 2]);
+
+/// Half by half.
+macro_rules! both {
+    ($operation:expr, $a:expr $(, $b:expr)*) => {
+        [$operation($a.0[0] $(, $b.0[0])*), $operation($a.0[1] $(, $b.0[1])*)]
+    };
+}
 
 impl F8 {
     #[inline(always)]
     pub(crate) fn splat(x: f32) -> F8 {
-        F8([x; 8])
+        F8([F4::splat(x); 2])
+    }
+
+    #[inline(always)]
+    pub(crate) fn new(lanes: [f32; 8]) -> F8 {
+        F8::load(&lanes, 0)
+    }
+
+    #[inline(always)]
+    pub(crate) fn lanes(self) -> [f32; 8] {
+        let mut lanes = [0.0; 8];
+        self.store(&mut lanes, 0);
+        lanes
     }
 
     /// The eight from `start` on.
     #[inline(always)]
     pub(crate) fn load(plane: &[f32], start: usize) -> F8 {
-        F8(plane[start..start + 8].try_into().expect("eight"))
+        let [low, high] = halves(&plane[start..start + 8]);
+        F8([F4::load(low), F4::load(high)])
     }
 
     #[inline(always)]
-    fn with(self, other: F8, f: impl Fn(f32, f32) -> f32) -> F8 {
-        let mut result = [0.0; 8];
-        for lane in 0..8 {
-            result[lane] = f(self.0[lane], other.0[lane]);
-        }
-        F8(result)
+    pub(crate) fn store(self, plane: &mut [f32], start: usize) {
+        let plane = &mut plane[start..start + 8];
+        plane[..4].copy_from_slice(&self.0[0].lanes());
+        plane[4..].copy_from_slice(&self.0[1].lanes());
     }
 
     /// `self` where the mask is set, `other` elsewhere.
     #[inline(always)]
     pub(crate) fn or(self, mask: M8, other: F8) -> F8 {
-        let mut result = [0.0; 8];
-        for lane in 0..8 {
-            let (a, b) = (self.0[lane].to_bits(), other.0[lane].to_bits());
-            result[lane] = f32::from_bits((a & mask.0[lane]) | (b & !mask.0[lane]));
-        }
-        F8(result)
+        F8(both!(F4::or, self, mask, other))
     }
 
     #[inline(always)]
     pub(crate) fn less_than(self, other: F8) -> M8 {
-        let mut mask = [0; 8];
-        for lane in 0..8 {
-            mask[lane] = u32::from(self.0[lane] < other.0[lane]).wrapping_neg();
-        }
-        M8(mask)
+        M8(both!(F4::less_than, self, other))
+    }
+
+    /// Towards zero. Numbers that are not in 0..2³¹ give something.
+    #[inline(always)]
+    pub(crate) fn truncated(self) -> M8 {
+        M8(both!(F4::truncated, self))
     }
 }
 
 macro_rules! lane_by_lane {
-    ($($trait:ident $method:ident $op:tt),*) => {$(
+    ($($trait:ident $method:ident),*) => {$(
         impl std::ops::$trait for F8 {
             type Output = F8;
             #[inline(always)]
             fn $method(self, other: F8) -> F8 {
-                self.with(other, |a, b| a $op b)
+                F8(both!(F4::$method, self, other))
             }
         }
     )*};
 }
-lane_by_lane!(Add add +, Sub sub -, Mul mul *, Div div /);
+lane_by_lane!(Add add, Sub sub, Mul mul, Div div);
 
-/// Eight whole numbers at a time; as a mask, all bits of a lane are set or none.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct M8(pub(crate) [u32; 8]);
+macro_rules! whole_lane_by_lane {
+    ($($(#[$doc:meta])* $method:ident),* $(,)?) => {$(
+        $(#[$doc])*
+        #[inline(always)]
+        pub(crate) fn $method(self, other: M8) -> M8 {
+            M8(both!(M4::$method, self, other))
+        }
+    )*};
+}
 
 impl M8 {
+    #[inline(always)]
+    pub(crate) fn splat(x: u32) -> M8 {
+        M8([M4::splat(x); 2])
+    }
+
+    #[inline(always)]
+    pub(crate) fn new(lanes: [u32; 8]) -> M8 {
+        M8::load(&lanes, 0)
+    }
+
+    #[inline(always)]
+    pub(crate) fn lanes(self) -> [u32; 8] {
+        let mut lanes = [0; 8];
+        self.store(&mut lanes, 0);
+        lanes
+    }
+
     /// The eight from `start` on.
     #[inline(always)]
     pub(crate) fn load(plane: &[u32], start: usize) -> M8 {
-        M8(plane[start..start + 8].try_into().expect("eight"))
+        let [low, high] = halves(&plane[start..start + 8]);
+        M8([M4::load(low), M4::load(high)])
     }
 
     #[inline(always)]
-    fn with(self, other: M8, f: impl Fn(u32, u32) -> u32) -> M8 {
-        let mut result = [0; 8];
-        for lane in 0..8 {
-            result[lane] = f(self.0[lane], other.0[lane]);
-        }
-        M8(result)
+    pub(crate) fn store(self, plane: &mut [u32], start: usize) {
+        let plane = &mut plane[start..start + 8];
+        plane[..4].copy_from_slice(&self.0[0].lanes());
+        plane[4..].copy_from_slice(&self.0[1].lanes());
     }
 
-    #[inline(always)]
-    pub(crate) fn equals(self, other: M8) -> M8 {
-        self.with(other, |a, b| u32::from(a == b).wrapping_neg())
-    }
-
-    #[inline(always)]
-    pub(crate) fn and(self, other: M8) -> M8 {
-        self.with(other, |a, b| a & b)
-    }
+    whole_lane_by_lane!(
+        equals,
+        /// As signed numbers.
+        less_than,
+        and,
+        either,
+        /// Sum modulo 2³².
+        plus,
+        /// Difference modulo 2³².
+        minus,
+        /// Product modulo 2³².
+        times,
+    );
 
     #[inline(always)]
     pub(crate) fn not(self) -> M8 {
-        self.with(self, |a, _| !a)
+        self.equals(M8::splat(0))
+    }
+
+    /// As signed numbers.
+    #[inline(always)]
+    pub(crate) fn to_f32(self) -> F8 {
+        F8(both!(M4::to_f32, self))
     }
 
     /// `self` where the mask is set, `other` elsewhere.
     #[inline(always)]
     pub(crate) fn or(self, mask: M8, other: M8) -> M8 {
-        let mut result = [0; 8];
-        for lane in 0..8 {
-            result[lane] = (self.0[lane] & mask.0[lane]) | (other.0[lane] & !mask.0[lane]);
-        }
-        M8(result)
+        self.and(mask).either(mask.not().and(other))
+    }
+
+    /// A mask of the first lanes.
+    #[inline(always)]
+    pub(crate) fn first_lanes(lanes: usize) -> M8 {
+        M8::new([0, 1, 2, 3, 4, 5, 6, 7]).less_than(M8::splat(lanes as u32))
+    }
+
+    /// A bit per lane of a mask.
+    #[inline(always)]
+    pub(crate) fn bits(self) -> u32 {
+        self.0[0].bits() | self.0[1].bits() << 4
     }
 
     /// Whether all lanes of a mask are set.
     #[inline(always)]
     pub(crate) fn all(self) -> bool {
-        self.0.iter().fold(u32::MAX, |all, lane| all & lane) == u32::MAX
+        self.bits() == 255
+    }
+
+    /// Whether any lane of a mask is set.
+    #[inline(always)]
+    pub(crate) fn any(self) -> bool {
+        self.bits() != 0
+    }
+
+    /// The first lane of a mask that is set.
+    #[inline(always)]
+    pub(crate) fn first(self) -> Option<usize> {
+        let bits = self.bits();
+        (bits != 0).then(|| bits.trailing_zeros() as usize)
+    }
+
+    /// The lanes of a mask that are set.
+    #[inline(always)]
+    pub(crate) fn for_each(self, mut act: impl FnMut(usize)) {
+        let mut bits = self.bits();
+        while bits != 0 {
+            act(bits.trailing_zeros() as usize);
+            bits &= bits - 1;
+        }
+    }
+}
+
+#[inline(always)]
+fn halves<T>(eight: &[T]) -> [&[T; 4]; 2] {
+    let (halves, _) = eight.as_chunks::<4>();
+    [&halves[0], &halves[1]]
+}
+
+/// `into[k] = from[index[k]]`.
+///
+/// # Panics
+/// If an index is not in `from`, or there are not as many as places.
+#[inline(always)]
+pub(crate) fn gather<T: Copy>(into: &mut [T], from: &[T], index: &[u32]) {
+    assert_eq!(into.len(), index.len());
+    let largest = index.iter().fold(0, |largest, &i| largest.max(i));
+    assert!((largest as usize) < from.len());
+    for (into, &i) in into.iter_mut().zip(index) {
+        // SAFETY: no index is larger than `largest`, which has just been found to be in `from`.
+        *into = unsafe { *from.get_unchecked(i as usize) };
     }
 }

@@ -4,19 +4,17 @@
 //! the left (Danielsson 1980, "Euclidean distance mapping"): not always the very nearest, but at a cost that does not depend on
 //! how large a hole is.
 
-use super::gather::Hole;
 use crate::Size;
 
 /// Nothing is known anywhere.
 pub(super) const NOBODY: u32 = u32::MAX;
 
-/// `source`: per pixel the nearest that is not in `holes`, which are in row-major order.
-pub(super) fn nearest(size: Size, holes: &[u32], source: &mut Vec<u32>) {
-    source.clear();
-    source.extend(0..size.pixels() as u32);
-    for &hole in holes {
-        source[hole as usize] = NOBODY;
-    }
+/// The pixels around one, the nearest first.
+pub(super) const AROUND: [[i32; 2]; 8] =
+    [[-1, 0], [0, -1], [1, 0], [0, 1], [-1, -1], [1, -1], [1, 1], [-1, 1]];
+
+/// `source`: per pixel the nearest that is known. `holes`, in row-major order, are [`NOBODY`] before.
+pub(super) fn nearest(size: Size, holes: &[u32], source: &mut [u32]) {
     for &hole in holes {
         hand_on(size, hole, [[-1, 0], [-1, -1], [0, -1], [1, -1]], source);
     }
@@ -49,15 +47,6 @@ fn beside(size: Size, x: u32, y: u32, dx: i32, dy: i32) -> Option<u32> {
     (x < size.width && y < size.height).then(|| size.index(x, y))
 }
 
-/// How well a hole can be guessed: from at least four known neighbours, or not.
-pub(super) fn kind(size: Size, source: &[u32], hole: u32) -> Hole {
-    let (x, y) = size.xy(hole);
-    let around = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy)));
-    let neighbours = around.filter_map(|(dx, dy)| beside(size, x, y, dx, dy));
-    let known = neighbours.filter(|&pixel| source[pixel as usize] == pixel).count();
-    if known >= 4 { Hole::Small } else { Hole::Large }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -69,7 +58,8 @@ mod tests {
         let known: Vec<u32> = (0..30).map(|_| rng.below(size.pixels() as u32)).collect();
         let holes: Vec<u32> =
             (0..size.pixels() as u32).filter(|pixel| !known.contains(pixel)).collect();
-        let mut source = Vec::new();
+        let mut source: Vec<u32> = (0..size.pixels() as u32).collect();
+        holes.iter().for_each(|&hole| source[hole as usize] = NOBODY);
         nearest(size, &holes, &mut source);
         let distance = |a: u32, b: u32| {
             let ((ax, ay), (bx, by)) = (size.xy(a), size.xy(b));
@@ -86,9 +76,8 @@ mod tests {
     #[test]
     fn where_nothing_is_known_nobody_is_found() {
         let size = Size::new(3, 2);
-        let mut source = Vec::new();
+        let mut source = [NOBODY; 6];
         nearest(size, &[0, 1, 2, 3, 4, 5], &mut source);
         assert_eq!(source, [NOBODY; 6]);
-        assert_eq!(kind(size, &source, 1), Hole::Large);
     }
 }

@@ -9,88 +9,147 @@
 //! the mean of those around that belong to the nearest one's object, farther away what the nearest pixel shows that is no hole
 //! ([`fill`](super::fill)).
 
-use super::fill;
-use super::store::{EMPTY, Store, Tick};
-use crate::Time;
+use super::fill::{self, AROUND};
+use super::holes::{Hole, Waiting};
+use super::store::{CENTRAL_PX, EMPTY, Layout, Store, TICK_SECS, Tick};
 use crate::rates::Rates;
 use crate::wide::{self, F8, M8};
+use crate::{Size, Time};
 
-/// Whether a pixel had a sample of its own.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Hole {
-    No,
-    /// There is one, but not at the pixel's centre, and nothing moves that could have carried it there.
-    OffCentre,
-    /// Neighbours know enough for a good guess.
-    Small,
-    /// Nothing near is known.
-    Large,
-}
-
-impl Hole {
-    pub(super) fn is_unknown(self) -> bool {
-        matches!(self, Hole::Small | Hole::Large)
-    }
-}
-
+/// What became of the pixels.
 #[derive(Default)]
 pub(super) struct Gather {
-    holes: Vec<Hole>,
-    empty: Vec<u32>,
-    /// Per pixel the one whose sample it shows.
+    /// Per pixel when what it shows was traced; [`Time::ZERO`] if nothing is known anywhere.
+    pub(super) time: Vec<Time>,
+    /// Per pixel whether it has a sample of its own.
+    pub(super) known: Vec<bool>,
+    /// Pixels to be traced.
+    pub(super) waiting: Waiting,
+    /// Per pixel the one whose sample it shows: itself, unless it is a hole.
     source: Vec<u32>,
+    /// Holes that are not beside samples.
+    far: Vec<u32>,
 }
 
 /// Below this expected error a sample is taken as it is.
 const EXACT: f32 = 2e-5;
 
 impl Gather {
-    /// Per pixel.
-    pub(super) fn holes(&self) -> &[Hole] {
-        &self.holes
-    }
-
-    /// After a picture: samples beside their pixel's centre are to be traced again, where their object `rests`.
-    pub(super) fn find_off_centre(&mut self, store: &Store, rests: impl Fn(u32) -> bool) {
-        let size = store.layout.size;
-        for (pixel, hole) in self.holes.iter_mut().enumerate().filter(|(_, h)| **h == Hole::No) {
-            let (x, y) = size.xy(pixel as u32);
-            let may_rest = store.newest(x, y).is_some_and(|cell| rests(store.object[cell]));
-            if may_rest && store.central(x, y).is_none() {
-                *hole = Hole::OffCentre;
-            }
-        }
-    }
-
-    /// The pixel whose sample a pixel shows: itself, unless it is a hole; `None` if nothing is known anywhere.
-    pub(super) fn source(&self, pixel: usize) -> Option<u32> {
-        let source = self.source[pixel];
-        (source != fill::NOBODY).then_some(source)
-    }
-
-    /// `contrast` per tile of `rates`, whose tiles are eight pixels wide.
+    /// `contrast` per tile of `rates`, whose tiles are eight pixels wide; `shown`: the picture if nothing is known.
     pub(super) fn run(
         &mut self,
         store: &Store,
         now: Time,
         rates: &Rates,
         contrast: &[f32],
-        picture: &mut [[f32; 3]],
+        shown: &[[f32; 3]],
+        picture: &mut Vec<[f32; 3]>,
     ) {
-        self.holes.clear();
-        self.holes.resize(picture.len(), Hole::No);
-        self.empty.clear();
+        let pixels = store.layout.size.pixels();
+        picture.resize(pixels, [0.0; 3]);
+        self.time.resize(pixels, Time::ZERO);
+        self.known.resize(pixels, false);
+        self.source.resize(pixels, fill::NOBODY);
+        self.far.clear();
+        self.waiting.clear();
         let model = Model { store, now: Tick::of(now), rates, contrast };
-        wide::run(Blocks { model, picture, empty: &mut self.empty });
-        fill::nearest(store.layout.size, &self.empty, &mut self.source);
-        for &pixel in &self.empty {
+        let cells = Cells::new(&store.layout);
+        wide::run(Blocks { model, cells: &cells, now, picture, gather: self });
+        self.fill_far(store.layout.size, shown, picture);
+    }
+
+    fn fill_far(&mut self, size: Size, shown: &[[f32; 3]], picture: &mut [[f32; 3]]) {
+        fill::nearest(size, &self.far, &mut self.source);
+        for &pixel in &self.far {
             let i = pixel as usize;
-            if let Some(rgb) = model.between(pixel) {
-                picture[i] = rgb;
-            } else if let Some(source) = self.source(i) {
-                picture[i] = picture[source as usize];
+            let source = self.source[i] as usize;
+            (picture[i], self.time[i]) = match self.source[i] {
+                fill::NOBODY => (shown[i], Time::ZERO),
+                _ => (picture[source], self.time[source]),
+            };
+        }
+    }
+
+    /// After a picture: samples beside their pixel's centre are to be traced again, where their object `rests`.
+    pub(super) fn find_off_centre(&mut self, store: &Store, rests: impl Fn(u32) -> bool) {
+        wide::run(OffCentre { store, rests, waiting: &mut self.waiting });
+    }
+}
+
+struct OffCentre<'a, F> {
+    store: &'a Store,
+    rests: F,
+    waiting: &'a mut Waiting,
+}
+
+impl<F: Fn(u32) -> bool> wide::Task for OffCentre<'_, F> {
+    #[inline(always)]
+    fn run(self) {
+        let OffCentre { store, rests, waiting } = self;
+        let Layout { size, per_side, plane, .. } = store.layout;
+        for y in 0..size.height {
+            for x in (0..size.width).step_by(8) {
+                let first = store.layout.of_pixel(x as i32, y as i32);
+                let centre = centres(x, y);
+                let (mut known, mut central) = (M8::splat(0), M8::splat(0));
+                for sub in 0..(per_side * per_side) as usize {
+                    let i = first + sub * plane;
+                    let is_sample = M8::load(&store.object, i).equals(M8::splat(EMPTY)).not();
+                    let is_near =
+                        distance2(store, i, &centre).less_than(F8::splat(CENTRAL_PX * CENTRAL_PX));
+                    known = known.either(is_sample);
+                    central = central.either(is_sample.and(is_near));
+                }
+                // Cells beyond the border are empty.
+                known.and(central.not()).for_each(|lane| {
+                    let x = x + lane as u32;
+                    if store.newest(x, y).is_some_and(|cell| rests(store.object[cell])) {
+                        waiting.push(size.index(x, y), x, y, Hole::OffCentre);
+                    }
+                });
             }
-            self.holes[i] = fill::kind(store.layout.size, &self.source, pixel);
+        }
+    }
+}
+
+/// Of the eight pixels from (x, y) on.
+#[inline(always)]
+fn centres(x: u32, y: u32) -> [F8; 2] {
+    let columns = M8::new([0, 1, 2, 3, 4, 5, 6, 7]).plus(M8::splat(x));
+    [columns.to_f32() + F8::splat(0.5), F8::splat(y as f32 + 0.5)]
+}
+
+/// From eight samples to the eight centres.
+#[inline(always)]
+fn distance2(store: &Store, i: usize, centre: &[F8; 2]) -> F8 {
+    let dx = F8::load(&store.px[0], i) - centre[0];
+    let dy = F8::load(&store.px[1], i) - centre[1];
+    dx * dx + dy * dy
+}
+
+/// From the first cell of a pixel to others.
+struct Cells {
+    own: Vec<isize>,
+    /// Those of the 3×3 pixels around, and whether they are at most one cell away: all bits, or none.
+    around: Vec<(isize, u32)>,
+    /// First cells of the pixels [`AROUND`].
+    pixels: [isize; 8],
+}
+
+impl Cells {
+    fn new(layout: &Layout) -> Cells {
+        let n = layout.per_side as i32;
+        let here = layout.of_pixel(0, 0) as isize;
+        let to = |dx, dy| layout.neighbour(0, 0, dx, dy) as isize - here;
+        let square = |cells: std::ops::Range<i32>| {
+            cells.clone().flat_map(move |dy| cells.clone().map(move |dx| (dx, dy)))
+        };
+        let is_near = |d: i32| -1 <= d && d <= n;
+        let mask = |dx, dy| u32::from(is_near(dx) && is_near(dy)).wrapping_neg();
+        Cells {
+            own: square(0..n).map(|(dx, dy)| to(dx, dy)).collect(),
+            around: square(-n..2 * n).map(|(dx, dy)| (to(dx, dy), mask(dx, dy))).collect(),
+            pixels: AROUND.map(|[dx, dy]| to(n * dx, n * dy)),
         }
     }
 }
@@ -104,145 +163,200 @@ struct Model<'a> {
     contrast: &'a [f32],
 }
 
-/// Pixels that have a sample of their own, eight at a time.
+/// All pixels, eight at a time.
 struct Blocks<'a> {
     model: Model<'a>,
+    cells: &'a Cells,
+    now: Time,
     picture: &'a mut [[f32; 3]],
-    empty: &'a mut Vec<u32>,
-}
-
-impl wide::Task for Blocks<'_> {
-    #[inline(always)]
-    fn run(self) {
-        let Blocks { model, picture, empty } = self;
-        let size = model.store.layout.size;
-        for y in 0..size.height {
-            for x in (0..size.width).step_by(8) {
-                let (rgb, objects) = model.block(x as i32, y as i32);
-                let first = size.index(x, y) as usize;
-                for lane in 0..8.min((size.width - x) as usize) {
-                    if objects.0[lane] == EMPTY {
-                        empty.push((first + lane) as u32);
-                    } else {
-                        picture[first + lane] = rgb.map(|plane| plane.0[lane]);
-                    }
-                }
-            }
-        }
-    }
+    gather: &'a mut Gather,
 }
 
 /// Eight pixels in a row of one tile.
 struct Eight {
+    /// The first cell of the first one.
+    first: usize,
     centre: [F8; 2],
     /// The tile's learned rate of change, and its contrast.
     v: F8,
     s: F8,
 }
 
-impl Model<'_> {
-    /// Colours, and the objects that are seen.
+/// What eight pixels show.
+struct Seen {
+    rgb: [F8; 3],
+    /// The object; [`EMPTY`] where there is none.
+    object: M8,
+    /// The expected error of the reference.
+    error: F8,
+    /// When the pixel's newest sample was traced.
+    tick: M8,
+}
+
+impl wide::Task for Blocks<'_> {
     #[inline(always)]
-    fn block(&self, x: i32, y: i32) -> ([F8; 3], M8) {
-        let layout = &self.store.layout;
-        let n = layout.per_side as i32;
-        let tile = self.rates.grid.tile_of(layout.size.index(x as u32, y as u32));
-        let mut centre_x = [0.0; 8];
-        for (lane, centre) in centre_x.iter_mut().enumerate() {
-            *centre = (x + lane as i32) as f32 + 0.5;
+    fn run(mut self) {
+        let size = self.model.store.layout.size;
+        let columns = self.model.rates.grid.columns;
+        for y in 0..size.height {
+            for x in (0..size.width).step_by(8) {
+                self.block(x, y, (y / 8 * columns + x / 8) as usize);
+            }
         }
+    }
+}
+
+impl Blocks<'_> {
+    #[inline(always)]
+    fn block(&mut self, x: u32, y: u32, tile: usize) {
+        let Model { store, rates, contrast, .. } = self.model;
+        let size = store.layout.size;
         let eight = Eight {
-            centre: [F8(centre_x), F8::splat(y as f32 + 0.5)],
-            v: F8::splat(self.rates.of_tile(tile)),
-            s: F8::splat(self.contrast[tile]),
+            first: store.layout.of_pixel(x as i32, y as i32),
+            centre: centres(x, y),
+            v: F8::splat(rates.of_tile(tile)),
+            s: F8::splat(contrast[tile]),
         };
-        let mut least = F8::splat(f32::MAX);
-        let mut objects = M8([EMPTY; 8]);
-        let mut rgb = [F8::splat(0.0); 3];
-        for dy in 0..n {
-            for dx in 0..n {
-                let i = layout.neighbour(x, y, dx, dy);
-                let error = self.errors(i, &eight);
-                let object = M8::load(&self.store.object, i);
-                let better = error.less_than(least).and(object.equals(M8([EMPTY; 8])).not());
-                least = error.or(better, least);
-                objects = object.or(better, objects);
-                for (rgb, plane) in rgb.iter_mut().zip(&self.store.rgb) {
-                    *rgb = F8::load(plane, i).or(better, *rgb);
-                }
-            }
+        let mut seen = self.model.own(&eight, self.cells);
+        let empty = M8::splat(EMPTY);
+        let lanes = 8.min((size.width - x) as usize);
+        let holes = seen.object.equals(empty).and(M8::first_lanes(lanes));
+        if holes.any() {
+            seen.object = self.model.nearest(&eight, self.cells).or(holes, seen.object);
         }
-        let exact = least.less_than(F8::splat(EXACT));
-        if exact.or(objects.equals(M8([EMPTY; 8])).not(), M8([u32::MAX; 8])).all() {
-            return (rgb, objects);
+        let exact = seen.error.less_than(F8::splat(EXACT));
+        if !exact.either(seen.object.equals(empty)).all() {
+            let mean = self.model.mean(&eight, self.cells, seen.object, holes);
+            seen.rgb = [0, 1, 2].map(|k| seen.rgb[k].or(exact, mean[k]));
         }
-        let mean = self.mean(x, y, &eight, objects);
-        (std::array::from_fn(|k| rgb[k].or(exact, mean[k])), objects)
+        let start = size.index(x, y) as usize;
+        let (rgb, ticks, are_holes) = (seen.rgb.map(F8::lanes), seen.tick.lanes(), holes.bits());
+        for lane in 0..lanes {
+            let pixel = start + lane;
+            self.picture[pixel] = [rgb[0][lane], rgb[1][lane], rgb[2][lane]];
+            self.gather.known[pixel] = are_holes & (1 << lane) == 0;
+            self.gather.time[pixel] = Tick(ticks[lane]).time(self.now);
+            self.gather.source[pixel] = pixel as u32;
+        }
+        if holes.any() {
+            self.note_holes(&eight, holes, x, y);
+        }
     }
 
+    /// How well holes can be guessed, and whose sample they show.
     #[inline(always)]
-    fn errors(&self, i: usize, eight: &Eight) -> F8 {
-        let dx = F8::load(&self.store.px[0], i) - eight.centre[0];
-        let dy = F8::load(&self.store.px[1], i) - eight.centre[1];
-        let ticks = M8::load(&self.store.tick, i);
-        let mut age_secs = [0.0; 8];
-        for (age_secs, tick) in age_secs.iter_mut().zip(ticks.0) {
-            *age_secs = Tick(tick).secs_until(self.now);
+    fn note_holes(&mut self, eight: &Eight, holes: M8, x: u32, y: u32) {
+        let Model { store, .. } = self.model;
+        let size = store.layout.size;
+        let (mut nearest, mut known) = (M8::splat(AROUND.len() as u32), M8::splat(0));
+        for (k, &offset) in self.cells.pixels.iter().enumerate().rev() {
+            let first = eight.first.wrapping_add_signed(offset);
+            let is_known = self.model.are_known(first, self.cells);
+            nearest = M8::splat(k as u32).or(is_known, nearest);
+            // A mask is −1 where it is set.
+            known = known.plus(is_known);
         }
-        eight.v * F8(age_secs) + eight.s * (dx * dx + dy * dy)
-    }
-
-    /// Over the pixel's cells and those one further around.
-    #[inline(always)]
-    fn mean(&self, x: i32, y: i32, eight: &Eight, objects: M8) -> [F8; 3] {
-        let n = self.store.layout.per_side as i32;
-        let floor = F8::splat(least_error(eight.s.0[0]));
-        let zero = F8::splat(0.0);
-        let (mut red, mut green, mut blue, mut weights) = (zero, zero, zero, zero);
-        for dy in -1..=n {
-            for dx in -1..=n {
-                let i = self.store.layout.neighbour(x, y, dx, dy);
-                let error = self.errors(i, eight) + floor;
-                let same = M8::load(&self.store.object, i).equals(objects);
-                let weight = (F8::splat(1.0) / (error * error)).or(same, zero);
-                weights = weights + weight;
-                red = red + weight * F8::load(&self.store.rgb[0], i);
-                green = green + weight * F8::load(&self.store.rgb[1], i);
-                blue = blue + weight * F8::load(&self.store.rgb[2], i);
+        let (nearest, known) = (nearest.lanes(), known.lanes());
+        holes.for_each(|lane| {
+            let x = x + lane as u32;
+            let pixel = size.index(x, y);
+            let hole = if known[lane] as i32 <= -4 { Hole::Small } else { Hole::Large };
+            self.gather.waiting.push(pixel, x, y, hole);
+            let Some([dx, dy]) = AROUND.get(nearest[lane] as usize) else {
+                self.gather.source[pixel as usize] = fill::NOBODY;
+                self.gather.far.push(pixel);
+                return;
+            };
+            let (x, y) = (x.wrapping_add_signed(*dx), y.wrapping_add_signed(*dy));
+            self.gather.source[pixel as usize] = size.index(x, y);
+            if let Some(i) = store.newest(x, y) {
+                self.gather.time[pixel as usize] = Tick(store.tick[i]).time(self.now);
             }
-        }
-        [red / weights, green / weights, blue / weights]
+        });
     }
 }
 
 impl Model<'_> {
-    /// A hole beside samples: the mean of those around it that belong to the nearest one's object. `None` if there are none.
-    fn between(&self, pixel: u32) -> Option<[f32; 3]> {
-        let layout = &self.store.layout;
-        let (x, y) = layout.size.xy(pixel);
-        let (n, tile) = (layout.per_side as i32, self.rates.grid.tile_of(pixel));
-        let (v, s) = (self.rates.of_tile(tile), self.contrast[tile]);
-        let around = move || {
-            let rows = -n..2 * n;
-            let cells = rows.flat_map(move |dy| (-n..2 * n).map(move |dx| (dx, dy)));
-            let cells = cells.map(move |(dx, dy)| layout.neighbour(x as i32, y as i32, dx, dy));
-            cells.filter(|&i| !self.store.is_empty(i))
+    #[inline(always)]
+    fn errors(&self, i: usize, eight: &Eight) -> F8 {
+        let ticks = M8::splat(self.now.0).minus(M8::load(&self.store.tick, i));
+        let age_secs = ticks.to_f32() * F8::splat(TICK_SECS);
+        eight.v * age_secs + eight.s * distance2(self.store, i, &eight.centre)
+    }
+
+    /// The pixels' own samples with the least expected error.
+    #[inline(always)]
+    fn own(&self, eight: &Eight, cells: &Cells) -> Seen {
+        let mut seen = Seen {
+            rgb: [F8::splat(0.0); 3],
+            object: M8::splat(EMPTY),
+            error: F8::splat(f32::MAX),
+            tick: M8::splat(0),
         };
-        let distance2 = |i: usize| {
-            let dx = self.store.px[0][i] - (x as f32 + 0.5);
-            let dy = self.store.px[1][i] - (y as f32 + 0.5);
-            dx * dx + dy * dy
-        };
-        let nearest = around().min_by(|&a, &b| distance2(a).total_cmp(&distance2(b)))?;
-        let (mut sum, mut weights) = ([0.0; 3], 0.0);
-        for i in around().filter(|&i| self.store.object[i] == self.store.object[nearest]) {
-            let age_secs = Tick(self.store.tick[i]).secs_until(self.now);
-            let error = v * age_secs + s * distance2(i) + least_error(s);
-            let weight = 1.0 / (error * error);
-            (0..3).for_each(|k| sum[k] += weight * self.store.rgb[k][i]);
-            weights += weight;
+        for &offset in &cells.own {
+            let i = eight.first.wrapping_add_signed(offset);
+            let (error, object) = (self.errors(i, eight), M8::load(&self.store.object, i));
+            let is_sample = object.equals(M8::splat(EMPTY)).not();
+            let tick = M8::load(&self.store.tick, i);
+            let is_first = seen.object.equals(M8::splat(EMPTY));
+            let is_newer = M8::splat(0).less_than(tick.minus(seen.tick));
+            seen.tick = tick.or(is_sample.and(is_first.either(is_newer)), seen.tick);
+            let better = error.less_than(seen.error).and(is_sample);
+            seen.error = error.or(better, seen.error);
+            seen.object = object.or(better, seen.object);
+            for (rgb, plane) in seen.rgb.iter_mut().zip(&self.store.rgb) {
+                *rgb = F8::load(plane, i).or(better, *rgb);
+            }
         }
-        Some(sum.map(|c| c / weights))
+        seen
+    }
+
+    /// The objects of the samples nearest to the centres of holes; [`EMPTY`] where there is none around.
+    #[inline(always)]
+    fn nearest(&self, eight: &Eight, cells: &Cells) -> M8 {
+        let mut least = F8::splat(f32::INFINITY);
+        let mut nearest = M8::splat(EMPTY);
+        for &(offset, _) in &cells.around {
+            let i = eight.first.wrapping_add_signed(offset);
+            let object = M8::load(&self.store.object, i);
+            let is_sample = object.equals(M8::splat(EMPTY)).not();
+            let distance2 = distance2(self.store, i, &eight.centre);
+            let nearer = distance2.less_than(least).and(is_sample);
+            least = distance2.or(nearer, least);
+            nearest = object.or(nearer, nearest);
+        }
+        nearest
+    }
+
+    /// Over the objects' samples: those in the pixel's cells and one further around, for holes in the 3×3 pixels around.
+    #[inline(always)]
+    fn mean(&self, eight: &Eight, cells: &Cells, object: M8, holes: M8) -> [F8; 3] {
+        let floor = F8::splat(least_error(eight.s.lanes()[0]));
+        let zero = F8::splat(0.0);
+        let (mut red, mut green, mut blue, mut weights) = (zero, zero, zero, zero);
+        for &(offset, is_near) in &cells.around {
+            let i = eight.first.wrapping_add_signed(offset);
+            let counts = M8::load(&self.store.object, i).equals(object);
+            let counts = counts.and(holes.either(M8::splat(is_near)));
+            let error = self.errors(i, eight) + floor;
+            let weight = (F8::splat(1.0) / (error * error)).or(counts, zero);
+            weights = weights + weight;
+            red = red + weight * F8::load(&self.store.rgb[0], i);
+            green = green + weight * F8::load(&self.store.rgb[1], i);
+            blue = blue + weight * F8::load(&self.store.rgb[2], i);
+        }
+        [red / weights, green / weights, blue / weights]
+    }
+
+    /// Whether the pixels have samples of their own.
+    #[inline(always)]
+    fn are_known(&self, first: usize, cells: &Cells) -> M8 {
+        let mut known = M8::splat(0);
+        for &offset in &cells.own {
+            let object = M8::load(&self.store.object, first.wrapping_add_signed(offset));
+            known = known.either(object.equals(M8::splat(EMPTY)).not());
+        }
+        known
     }
 }
 

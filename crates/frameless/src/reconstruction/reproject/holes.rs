@@ -1,25 +1,67 @@
 //! Holes in the order in which they are filled: large ones first, those off their centre last, evenly spread in every part of the order.
 
-use super::gather::Hole;
-use crate::{Size, bayer};
+use crate::bayer;
+
+/// Why a pixel is to be traced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Hole {
+    /// It has no sample, and little near it is known.
+    Large,
+    /// It has no sample, but its neighbours know enough for a good guess.
+    Small,
+    /// Its samples are not at its centre, and nothing moves that could have carried them there.
+    OffCentre,
+}
 
 const BITS: u32 = 3;
+const RANKS: usize = 1 << (2 * BITS);
+/// Kinds of holes times places in Bayer's order.
+const CLASSES: usize = 3 * RANKS;
 
-/// The pixels that are holes.
-pub(super) fn order(holes: &[Hole], size: Size, ordered: &mut Vec<u32>) {
-    const RANKS: usize = 1 << (2 * BITS);
-    let mut by_rank: [[Vec<u32>; RANKS]; 3] =
-        std::array::from_fn(|_| std::array::from_fn(|_| Vec::new()));
-    for (pixel, &hole) in holes.iter().enumerate() {
-        let kind = match hole {
-            Hole::No => continue,
-            Hole::Large => 0,
-            Hole::Small => 1,
-            Hole::OffCentre => 2,
-        };
-        let (x, y) = size.xy(pixel as u32);
-        by_rank[kind][bayer::rank(x, y, BITS) as usize].push(pixel as u32);
+/// Pixels that wait to be traced.
+pub(super) struct Waiting {
+    /// The pixel, and its class.
+    found: Vec<(u32, u8)>,
+    /// Bayer's order of 8×8 pixels, row by row.
+    rank: [u8; RANKS],
+}
+
+impl Default for Waiting {
+    fn default() -> Waiting {
+        let side = 1 << BITS;
+        let rank = |i| bayer::rank(i as u32 % side, i as u32 / side, BITS) as u8;
+        Waiting { found: Vec::new(), rank: std::array::from_fn(rank) }
     }
-    ordered.clear();
-    by_rank.iter().flatten().for_each(|pixels| ordered.extend(pixels));
+}
+
+impl Waiting {
+    pub(super) fn clear(&mut self) {
+        self.found.clear();
+    }
+
+    /// `pixel` is the one at (x, y).
+    #[inline(always)]
+    pub(super) fn push(&mut self, pixel: u32, x: u32, y: u32, hole: Hole) {
+        let mask = (1 << BITS) - 1;
+        let rank = self.rank[((y & mask) << BITS | x & mask) as usize];
+        self.found.push((pixel, hole as u8 * RANKS as u8 + rank));
+    }
+
+    /// The most urgent first; those of one class in the order in which they were found (counting sort).
+    pub(super) fn order(&self, ordered: &mut Vec<u32>) {
+        let mut next = [0; CLASSES];
+        for &(_, class) in &self.found {
+            next[class as usize] += 1;
+        }
+        let mut before = 0;
+        for next in &mut next {
+            before += std::mem::replace(next, before);
+        }
+        ordered.resize(self.found.len(), 0);
+        for &(pixel, class) in &self.found {
+            let next = &mut next[class as usize];
+            ordered[*next] = pixel;
+            *next += 1;
+        }
+    }
 }

@@ -90,10 +90,9 @@ impl Reproject {
         if refinement.suspect {
             let (x, y) = kept.size.xy(request.pixel);
             let centre = [x as f32 + 0.5, y as f32 + 0.5];
-            let age_secs = self
-                .store
-                .newest(x, y)
-                .map_or(0.0, |cell| Tick(self.store.tick[cell]).secs_until(Tick::of(kept.now)));
+            let age_secs = self.store.newest(x, y).map_or(0.0, |cell| {
+                kept.now.secs_since(Tick(self.store.tick[cell]).time(kept.now))
+            });
             refinement.suspect = age_secs > LONG_SINCE_SECS
                 && self.beyond_range(centre, display.encode(rgb)) > 3.0 * residual::OUTDATED;
         }
@@ -102,7 +101,7 @@ impl Reproject {
 }
 
 /// A suspect pixel whose centre was traced later than this before is not looked at again: it shows something finer than a pixel.
-const LONG_SINCE_SECS: f32 = 0.05;
+const LONG_SINCE_SECS: f64 = 0.05;
 
 impl Reconstruction for Reproject {
     fn keep(&mut self, kept: &Kept<'_>, display: &Display, findings: &mut Findings) {
@@ -165,28 +164,22 @@ impl Reconstruction for Reproject {
             self.shown = canvas.rgb().iter().map(|&rgb| refresh.display.encode(rgb)).collect();
         }
         tile_contrast(&self.shown, &rates.grid, &mut self.contrast);
-        picture.clone_from(&self.shown);
-        self.gather.run(&self.store, refresh.now, rates, &self.contrast, picture);
-        self.gather.find_off_centre(&self.store, |object| self.settled.rests(object));
+        self.gather.run(&self.store, refresh.now, rates, &self.contrast, &self.shown, picture);
+        if self.settled.any_rests() {
+            self.gather.find_off_centre(&self.store, |object| self.settled.rests(object));
+        }
         let wanted = match refresh.is_noisy {
             true => settle::MOST_SAMPLES,
             false if self.options.antialias => settle::SAMPLES_WITHOUT_NOISE,
             false => 0,
         };
         if wanted > 0 {
-            let Reproject { settled, store, gather, relight, .. } = &mut *self;
-            settled.show(store, gather.holes(), relight, refresh, picture);
+            self.settled.show(&mut self.store, &self.relight, refresh, picture);
         }
         self.shown.clone_from(picture);
-        holes::order(self.gather.holes(), size, &mut self.holes);
-        let (store, gather) = (&self.store, &self.gather);
-        canvas.update(refresh.now, &mut self.holes, |pixel| {
-            let (x, y) = size.xy(pixel as u32);
-            let is_known = !gather.holes()[pixel].is_unknown();
-            let (x, y) = gather.source(pixel).map_or((x, y), |source| size.xy(source));
-            let newest = store.newest(x, y).map(|i| Tick(store.tick[i]).time(refresh.now));
-            (newest.unwrap_or(Time::ZERO), is_known)
-        });
-        canvas.set_samples(wanted, |pixel| self.settled.count(pixel as u32));
+        let gather::Gather { waiting, time, known, .. } = &mut self.gather;
+        waiting.order(&mut self.holes);
+        canvas.update(refresh.now, &mut self.holes, time, known);
+        canvas.set_samples(wanted, self.settled.counts());
     }
 }

@@ -14,7 +14,6 @@
 //! n ← min(n, σ² / δ²)                  δ² the squared change of the sample at the centre
 //! ```
 
-use super::gather::Hole;
 use super::relight::Relight;
 use super::store::{EMPTY, SCREEN, Store};
 use crate::tile::TileGrid;
@@ -58,6 +57,11 @@ impl Settled {
         self.spread = vec![0.0; size.pixels()];
         self.noise = vec![0.0; grid.len()];
         self.grid = Some(grid);
+    }
+
+    /// Of how many samples each pixel shows the mean; 0 where it is not at rest.
+    pub(super) fn counts(&self) -> &[u16] {
+        &self.count
     }
 
     /// Of how many samples a pixel shows the mean; 0 where it is not at rest.
@@ -144,6 +148,11 @@ impl Settled {
         self.sky_moved = now.picture_from_sky != before.picture_from_sky;
     }
 
+    /// Whether any object may rest.
+    pub(super) fn any_rests(&self) -> bool {
+        !self.sky_moved || self.moved.iter().any(|&moved| !moved)
+    }
+
     pub(super) fn rests(&self, object: u32) -> bool {
         match object {
             SCREEN | EMPTY => true,
@@ -170,7 +179,6 @@ impl Settled {
     pub(super) fn show(
         &mut self,
         store: &mut Store,
-        holes: &[Hole],
         relight: &Relight,
         refresh: &Refresh<'_>,
         picture: &mut [[f32; 3]],
@@ -178,7 +186,7 @@ impl Settled {
         let size = store.layout.size;
         for (pixel, rgb) in picture.iter_mut().enumerate() {
             let (x, y) = size.xy(pixel as u32);
-            let cell = store.central(x, y).filter(|_| holes[pixel] == Hole::No);
+            let cell = store.central(x, y);
             match cell.filter(|_| self.all_rest_around(store, x, y)) {
                 Some(cell) if self.count[pixel] == 0 || relight.has_changed(store.object[cell]) => {
                     self.begin(pixel, relight.linear(store, cell));

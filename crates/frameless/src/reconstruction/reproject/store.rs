@@ -13,7 +13,7 @@ pub(super) const SCREEN: u32 = Surface::SKY - 1;
 pub(super) const EMPTY: u32 = Surface::SKY - 2;
 
 /// A sample so near to the centre is as good as one at the centre: rounding of its projected position.
-const CENTRAL_PX: f32 = 0.002;
+pub(super) const CENTRAL_PX: f32 = 0.002;
 
 /// A point on an object, as in [`Surface`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -54,16 +54,11 @@ pub(super) struct Sample {
 pub(super) struct Tick(pub(super) u32);
 
 const TICK_BITS: u32 = 14;
-const TICK_SECS: f32 = (1u64 << TICK_BITS) as f32 * 1e-9;
+pub(super) const TICK_SECS: f32 = (1u64 << TICK_BITS) as f32 * 1e-9;
 
 impl Tick {
     pub(super) fn of(time: Time) -> Tick {
         Tick((time.0 >> TICK_BITS) as u32)
-    }
-
-    #[inline(always)]
-    pub(super) fn secs_until(self, now: Tick) -> f32 {
-        now.0.wrapping_sub(self.0) as i32 as f32 * TICK_SECS
     }
 
     /// The time, rounded down, of a tick that is not later than `now`.

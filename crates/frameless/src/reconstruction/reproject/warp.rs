@@ -4,8 +4,8 @@
 //! the other moves to the neighbouring cell on its side, if that is empty; so it is with samples whose surface is not known. At last what is seen through the cracks between a nearer
 //! object's samples is taken away.
 
-use super::store::{Anchor, EMPTY, SCREEN, Sample, Store, surface};
-use crate::wide::{self, F8};
+use super::store::{Anchor, EMPTY, Layout, SCREEN, Sample, Store, surface};
+use crate::wide::{self, F8, M8};
 use crate::{Pose, Surface};
 
 /// Depths within this ratio belong to the same surface.
@@ -17,16 +17,24 @@ const COVERS: f32 = 0.07;
 #[derive(Default)]
 pub(super) struct Warp {
     next: Option<Store>,
-    /// Where the samples are now, and how far; outside the picture where they are gone.
-    px: [Vec<f32>; 2],
-    depth: Vec<f32>,
+    carried: Carried,
     /// Per cell the old cell whose sample is here now.
     winner: Vec<u32>,
     losers: Vec<u32>,
-    covered: Vec<usize>,
+    covered: Vec<u32>,
 }
 
-const NOBODY: u32 = u32::MAX;
+/// Where the samples are now.
+#[derive(Default)]
+struct Carried {
+    px: [Vec<f32>; 2],
+    depth: Vec<f32>,
+    /// The cell there.
+    cell: Vec<u32>,
+}
+
+/// The first cell lies in the border, so that no sample is ever there.
+const NOWHERE: u32 = 0;
 /// Neither inside a picture nor NaN.
 const GONE_PX: f32 = -1.0;
 
@@ -41,41 +49,21 @@ impl Warp {
 
     /// Where every sample's surface is now.
     fn carry(&mut self, store: &Store, pose: &Pose) {
-        let cells = store.layout.len();
-        for plane in self.px.iter_mut().chain([&mut self.depth]) {
-            plane.clear();
-            plane.resize(cells, GONE_PX);
+        let Carried { px, depth, cell } = &mut self.carried;
+        for plane in px.iter_mut().chain([depth]) {
+            plane.resize(store.layout.len(), GONE_PX);
         }
-        wide::run(Carry { store, pose, px: &mut self.px, depth: &mut self.depth });
+        cell.resize(store.layout.len(), NOWHERE);
+        wide::run(Carry { store, pose, carried: &mut self.carried });
     }
 
     /// Who gets each cell.
     fn settle(&mut self, store: &Store) {
         self.winner.clear();
-        self.winner.resize(store.layout.len(), NOBODY);
+        self.winner.resize(store.layout.len(), NOWHERE);
         self.losers.clear();
-        for i in 0..store.layout.len() {
-            if store.object[i] == EMPTY {
-                continue;
-            }
-            let Some(cell) = store.layout.of_px([self.px[0][i], self.px[1][i]]) else { continue };
-            let there = self.winner[cell];
-            if there == NOBODY {
-                self.winner[cell] = i as u32;
-                continue;
-            }
-            let there = there as usize;
-            let (depth, other) = (self.depth[i], self.depth[there]);
-            let on_screen = store.object[i] == SCREEN || store.object[there] == SCREEN;
-            if !on_screen && depth < other * (1.0 - SAME_SURFACE) {
-                self.winner[cell] = i as u32;
-            } else if on_screen || depth <= other * (1.0 + SAME_SURFACE) {
-                let is_newer = store.tick[i].wrapping_sub(store.tick[there]) as i32 > 0;
-                let (winner, loser) = if is_newer { (i, there) } else { (there, i) };
-                self.winner[cell] = winner as u32;
-                self.losers.push(loser as u32);
-            }
-        }
+        let Warp { carried, winner, losers, .. } = self;
+        wide::run(Settle { store, carried, winner, losers });
     }
 
     fn rebuild(&mut self, store: &mut Store) {
@@ -84,149 +72,132 @@ impl Warp {
         if next.layout != store.layout {
             *next = Store::new(store.layout.size, store.layout.per_side);
         }
-        for (cell, &from) in self.winner.iter().enumerate() {
-            if from == NOBODY {
-                next.object[cell] = EMPTY;
-                continue;
-            }
-            let from = from as usize;
-            for k in 0..3 {
-                next.rgb[k][cell] = store.rgb[k][from];
-            }
-            next.tick[cell] = store.tick[from];
-            next.object[cell] = store.object[from];
-            next.anchor[cell] = store.anchor[from];
-            next.shade[cell] = store.shade[from];
-            next.px[0][cell] = self.px[0][from];
-            next.px[1][cell] = self.px[1][from];
-            next.depth[cell] = self.depth[from];
-        }
+        wide::run(Rebuild { store, carried: &self.carried, winner: &self.winner, next });
         std::mem::swap(store, next);
     }
 
     fn step_aside(&mut self, store: &mut Store) {
         let Some(old) = &self.next else { return };
-        let n = store.layout.per_side as f32;
-        for &loser in &self.losers {
-            let loser = loser as usize;
-            let px = [self.px[0][loser], self.px[1][loser]];
-            let [fx, fy] = px.map(|p| (p * n).fract() - 0.5);
-            let beside = if fx.abs() > fy.abs() {
-                [px[0] + fx.signum() / n, px[1]]
-            } else {
-                [px[0], px[1] + fy.signum() / n]
-            };
-            if let Some(i) = store.layout.of_px(beside)
-                && store.is_empty(i)
-            {
-                store.set(i, &Sample { px, depth: self.depth[loser], ..old.get(loser) });
-            }
-        }
+        wide::run(StepAside { old, carried: &self.carried, losers: &self.losers, store });
     }
 
     fn remove_seen_through_cracks(&mut self, store: &mut Store) {
         self.covered.clear();
-        let layout = store.layout;
-        let n = layout.per_side as i32;
-        for y in 1..layout.size.height as i32 - 1 {
-            for sub in 0..(n * n) as usize {
-                let row = layout.of_pixel(0, y) + sub * layout.plane;
-                for x in 1..layout.size.width as usize - 1 {
-                    let i = row + x;
-                    let object = store.object[i];
-                    let alike = object == store.object[i - 1] && object == store.object[i + 1];
-                    if !alike && object != EMPTY && is_covered(store, x as i32, y, sub) {
-                        self.covered.push(i);
-                    }
-                }
-            }
-        }
+        wide::run(Cracks { store, covered: &mut self.covered });
         for &i in &self.covered {
-            store.object[i] = EMPTY;
+            store.object[i as usize] = EMPTY;
         }
     }
-}
-
-/// Whether at least six of the eight samples around are of nearer, other objects, and at most one is not.
-fn is_covered(store: &Store, x: i32, y: i32, sub: usize) -> bool {
-    let layout = &store.layout;
-    let n = layout.per_side as i32;
-    let (sx, sy) = (sub as i32 % n, sub as i32 / n);
-    let here = layout.neighbour(x, y, sx, sy);
-    let (mut nearer, mut samples) = (0, 0);
-    for dy in -n..=n {
-        for dx in -n..=n {
-            let j = layout.neighbour(x, y, sx + dx, sy + dy);
-            if j != here && !store.is_empty(j) {
-                samples += 1;
-                let covers = store.depth[j] < store.depth[here] * (1.0 - COVERS);
-                nearer += usize::from(covers && store.object[j] != store.object[here]);
-            }
-        }
-    }
-    nearer >= 6 && nearer + 1 + 2 * (n as usize - 1) >= samples
 }
 
 struct Carry<'a> {
     store: &'a Store,
     pose: &'a Pose,
-    px: &'a mut [Vec<f32>; 2],
-    depth: &'a mut [f32],
+    carried: &'a mut Carried,
+}
+
+/// Where eight samples are.
+struct There {
+    px: [F8; 2],
+    depth: F8,
 }
 
 impl wide::Task for Carry<'_> {
     #[inline(always)]
     fn run(self) {
-        let Carry { store, pose, px: [px, py], depth } = self;
-        let blocks =
-            px.chunks_exact_mut(8).zip(py.chunks_exact_mut(8)).zip(depth.chunks_exact_mut(8));
-        for (block, ((px, py), depth)) in blocks.enumerate() {
-            let start = 8 * block;
-            let objects = &store.object[start..start + 8];
-            let object = objects[0];
-            let alike = objects.iter().all(|&other| other == object);
-            if alike && object == EMPTY {
+        let Carry { store, pose, carried: Carried { px: [px, py], depth, cell } } = self;
+        for start in (0..store.layout.len()).step_by(8) {
+            let objects = M8::load(&store.object, start);
+            let mut waiting = objects.equals(M8::splat(EMPTY)).not();
+            if !waiting.any() {
+                M8::splat(NOWHERE).store(cell, start);
                 continue;
             }
-            let is_rigid = !matches!(pose.deformed.get(object as usize), Some(Some(_)));
-            let projection = match object {
-                Surface::SKY => pose.picture_from_sky.as_ref(),
-                SCREEN => None,
-                object => pose.picture_from_object.get(object as usize),
-            };
-            if let Some(projection) = projection.filter(|_| alike && is_rigid) {
-                let [x, y, z] = coordinates(&store.anchor[start..start + 8]);
-                let row = |k: usize| {
-                    let [a, b, c, d] = projection.0[k].map(F8::splat);
-                    a * x + b * y + (c * z + d)
-                };
-                let w = row(3);
-                let in_front = F8::splat(0.0).less_than(w);
-                let gone = F8::splat(GONE_PX);
-                px.copy_from_slice(&(row(0) / w).or(in_front, gone).0);
-                py.copy_from_slice(&(row(1) / w).or(in_front, gone).0);
-                let infinite = if object == Surface::SKY { f32::INFINITY } else { 0.0 };
-                depth.copy_from_slice(&(row(2) + F8::splat(infinite)).0);
-                continue;
+            let anchors = coordinates(&store.anchor[start..start + 8]);
+            let gone = F8::splat(GONE_PX);
+            let mut there = There { px: [gone; 2], depth: gone };
+            while let Some(lane) = waiting.first() {
+                let object = store.object[start + lane];
+                let same = objects.equals(M8::splat(object));
+                waiting = waiting.and(same.not());
+                let now = carry_eight(store, pose, object, start, anchors);
+                there.px = [now.px[0].or(same, there.px[0]), now.px[1].or(same, there.px[1])];
+                there.depth = now.depth.or(same, there.depth);
             }
-            for lane in 0..8 {
-                let i = start + lane;
-                match objects[lane] {
-                    EMPTY => {}
-                    SCREEN => {
-                        (px[lane], py[lane]) = (store.px[0][i], store.px[1][i]);
-                        depth[lane] = f32::INFINITY;
-                    }
-                    object => {
-                        if let Some(there) = pose.project(&surface(object, &store.anchor[i])) {
-                            [px[lane], py[lane]] = there.px;
-                            depth[lane] = there.depth;
-                        }
-                    }
-                }
-            }
+            there.px[0].store(px, start);
+            there.px[1].store(py, start);
+            there.depth.store(depth, start);
+            cells_at(&store.layout, there.px).store(cell, start);
         }
     }
+}
+
+/// The eight samples from `start` on, as if all were of the same object.
+#[inline(always)]
+fn carry_eight(store: &Store, pose: &Pose, object: u32, start: usize, anchors: [F8; 3]) -> There {
+    let gone = F8::splat(GONE_PX);
+    if object == SCREEN {
+        let px = [F8::load(&store.px[0], start), F8::load(&store.px[1], start)];
+        return There { px, depth: F8::splat(f32::INFINITY) };
+    }
+    if matches!(pose.deformed.get(object as usize), Some(Some(_))) {
+        return carry_deformed(store, pose, object, start);
+    }
+    let projection = match object {
+        Surface::SKY => pose.picture_from_sky.as_ref(),
+        object => pose.picture_from_object.get(object as usize),
+    };
+    let Some(projection) = projection else { return There { px: [gone; 2], depth: gone } };
+    let [x, y, z] = anchors;
+    let row = |k: usize| {
+        let [a, b, c, d] = projection.0[k].map(F8::splat);
+        a * x + b * y + (c * z + d)
+    };
+    let w = row(3);
+    let in_front = F8::splat(0.0).less_than(w);
+    let per_w = F8::splat(1.0) / w;
+    let infinite = if object == Surface::SKY { f32::INFINITY } else { 0.0 };
+    There {
+        px: [0, 1].map(|k| (row(k) * per_w).or(in_front, gone)),
+        depth: row(2) + F8::splat(infinite),
+    }
+}
+
+fn carry_deformed(store: &Store, pose: &Pose, object: u32, start: usize) -> There {
+    let (mut px, mut depth) = ([[GONE_PX; 8]; 2], [GONE_PX; 8]);
+    for lane in 0..8 {
+        if store.object[start + lane] == object
+            && let Some(now) = pose.project(&surface(object, &store.anchor[start + lane]))
+        {
+            (0..2).for_each(|k| px[k][lane] = now.px[k]);
+            depth[lane] = now.depth;
+        }
+    }
+    There { px: px.map(F8::new), depth: F8::new(depth) }
+}
+
+/// [`Layout::of_px`], eight at a time; [`NOWHERE`] outside.
+#[inline(always)]
+fn cells_at(layout: &Layout, px: [F8; 2]) -> M8 {
+    let zero = F8::splat(0.0);
+    let [below, above] = px.map(|p| p.less_than(zero));
+    let size = layout.size;
+    let inside = px[0].less_than(F8::splat(size.width as f32));
+    let inside = inside.and(px[1].less_than(F8::splat(size.height as f32)));
+    let inside = inside.and(below.not()).and(above.not());
+    let [column, row] = px.map(F8::truncated);
+    let first = row.times(M8::splat(layout.stride as u32)).plus(column);
+    let mut cell = first.plus(M8::splat(layout.of_pixel(0, 0) as u32));
+    if layout.per_side > 1 {
+        let (n, last) = (layout.per_side, M8::splat(layout.per_side - 1));
+        let sub = |p: F8, whole: M8| {
+            let sub = ((p - whole.to_f32()) * F8::splat(n as f32)).truncated();
+            sub.or(sub.less_than(last), last)
+        };
+        let sub = sub(px[1], row).times(M8::splat(n)).plus(sub(px[0], column));
+        cell = cell.plus(sub.times(M8::splat(layout.plane as u32)));
+    }
+    cell.or(inside, M8::splat(NOWHERE))
 }
 
 /// x, y and z of eight points.
@@ -238,5 +209,197 @@ fn coordinates(anchors: &[Anchor]) -> [F8; 3] {
             plane[lane] = coordinate;
         }
     }
-    planes.map(F8)
+    planes.map(F8::new)
+}
+
+struct Settle<'a> {
+    store: &'a Store,
+    carried: &'a Carried,
+    winner: &'a mut [u32],
+    losers: &'a mut Vec<u32>,
+}
+
+impl wide::Task for Settle<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Settle { store, carried, winner, losers } = self;
+        for (i, &cell) in (0..).zip(&carried.cell) {
+            if cell == NOWHERE {
+                continue;
+            }
+            let there = winner[cell as usize];
+            winner[cell as usize] =
+                if there == NOWHERE { i } else { meet(store, &carried.depth, there, i, losers) };
+        }
+    }
+}
+
+/// Who stays where sample `i` comes to where `there` is already.
+#[inline(always)]
+fn meet(store: &Store, depths: &[f32], there: u32, i: u32, losers: &mut Vec<u32>) -> u32 {
+    let (a, b) = (i as usize, there as usize);
+    let (depth, other) = (depths[a], depths[b]);
+    let on_screen = store.object[a] == SCREEN || store.object[b] == SCREEN;
+    if !on_screen && depth < other * (1.0 - SAME_SURFACE) {
+        return i;
+    }
+    if !on_screen && depth > other * (1.0 + SAME_SURFACE) {
+        return there;
+    }
+    let is_newer = store.tick[a].wrapping_sub(store.tick[b]) as i32 > 0;
+    let (winner, loser) = if is_newer { (i, there) } else { (there, i) };
+    losers.push(loser);
+    winner
+}
+
+struct Rebuild<'a> {
+    store: &'a Store,
+    carried: &'a Carried,
+    winner: &'a [u32],
+    next: &'a mut Store,
+}
+
+/// Cells that are moved plane by plane before the next ones are: so many lie in the first-level cache.
+const CACHED: usize = 256;
+
+impl wide::Task for Rebuild<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Rebuild { store, carried, winner, next } = self;
+        for (start, from) in (0..).step_by(CACHED).zip(winner.chunks(CACHED)) {
+            let cells = start..start + from.len();
+            for k in 0..3 {
+                wide::gather(&mut next.rgb[k][cells.clone()], &store.rgb[k], from);
+            }
+            for k in 0..2 {
+                wide::gather(&mut next.px[k][cells.clone()], &carried.px[k], from);
+            }
+            wide::gather(&mut next.depth[cells.clone()], &carried.depth, from);
+            wide::gather(&mut next.tick[cells.clone()], &store.tick, from);
+            // Nobody is at `NOWHERE`: where nobody comes to, the cell is empty.
+            wide::gather(&mut next.object[cells.clone()], &store.object, from);
+            wide::gather(&mut next.anchor[cells.clone()], &store.anchor, from);
+            wide::gather(&mut next.shade[cells], &store.shade, from);
+        }
+    }
+}
+
+struct StepAside<'a> {
+    old: &'a Store,
+    carried: &'a Carried,
+    losers: &'a [u32],
+    store: &'a mut Store,
+}
+
+impl wide::Task for StepAside<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let StepAside { old, carried, losers, store } = self;
+        let n = store.layout.per_side as f32;
+        for &loser in losers {
+            let loser = loser as usize;
+            let px = [carried.px[0][loser], carried.px[1][loser]];
+            let [fx, fy] = px.map(|p| (p * n).fract() - 0.5);
+            let beside = if fx.abs() > fy.abs() {
+                [px[0] + fx.signum() / n, px[1]]
+            } else {
+                [px[0], px[1] + fy.signum() / n]
+            };
+            if let Some(i) = store.layout.of_px(beside)
+                && store.is_empty(i)
+            {
+                store.set(i, &Sample { px, depth: carried.depth[loser], ..old.get(loser) });
+            }
+        }
+    }
+}
+
+struct Cracks<'a> {
+    store: &'a Store,
+    covered: &'a mut Vec<u32>,
+}
+
+impl wide::Task for Cracks<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Cracks { store, covered } = self;
+        let layout = &store.layout;
+        let (n, size) = (layout.per_side as i32, layout.size);
+        for sub in 0..n * n {
+            let around = Around::new(layout, sub);
+            for y in 1..size.height as i32 - 1 {
+                for x in (1..size.width as i32 - 1).step_by(8) {
+                    let first = layout.of_pixel(x, y) + sub as usize * layout.plane;
+                    let inside = M8::first_lanes((size.width as i32 - 1 - x) as usize);
+                    let mask = are_covered(store, first, &around).and(inside);
+                    mask.for_each(|lane| covered.push((first + lane) as u32));
+                }
+            }
+        }
+    }
+}
+
+/// From a cell to those within a pixel's distance.
+struct Around {
+    offsets: [isize; 24],
+    len: usize,
+    /// How many may be there that do not cover.
+    others: u32,
+}
+
+impl Around {
+    fn new(layout: &Layout, sub: i32) -> Around {
+        let n = layout.per_side as i32;
+        let (sx, sy) = (sub % n, sub / n);
+        let here = layout.neighbour(1, 1, sx, sy) as isize;
+        let (mut offsets, mut len) = ([0; 24], 0);
+        for dy in -n..=n {
+            for dx in -n..=n {
+                if (dx, dy) != (0, 0) {
+                    offsets[len] = layout.neighbour(1, 1, sx + dx, sy + dy) as isize - here;
+                    len += 1;
+                }
+            }
+        }
+        Around { offsets, len, others: 1 + 2 * (n as u32 - 1) }
+    }
+}
+
+/// Whether at least six of the eight samples around are of nearer, other objects, and at most one is not.
+#[inline(always)]
+fn are_covered(store: &Store, first: usize, around: &Around) -> M8 {
+    let objects = M8::load(&store.object, first);
+    let empty = M8::splat(EMPTY);
+    let left = M8::load(&store.object, first - 1).equals(objects);
+    let alike = left.and(M8::load(&store.object, first + 1).equals(objects));
+    let candidates = alike.not().and(objects.equals(empty).not());
+    let none = M8::splat(0);
+    if !candidates.any() {
+        return none;
+    }
+    let offsets = &around.offsets[..around.len];
+    // Masks are −1 where they are set: counts are kept negative.
+    let mut foreign = none;
+    for &offset in offsets {
+        let others = M8::load(&store.object, first.wrapping_add_signed(offset));
+        foreign = foreign.plus(others.equals(objects).not().and(others.equals(empty).not()));
+    }
+    let candidates = candidates.and(foreign.less_than(M8::splat(-5i32 as u32)));
+    if !candidates.any() {
+        return none;
+    }
+    let limit = F8::load(&store.depth, first) * F8::splat(1.0 - COVERS);
+    let (mut nearer, mut samples) = (none, none);
+    for &offset in offsets {
+        let j = first.wrapping_add_signed(offset);
+        let others = M8::load(&store.object, j);
+        let is_sample = others.equals(empty).not();
+        let covers = F8::load(&store.depth, j).less_than(limit);
+        samples = samples.plus(is_sample);
+        nearer = nearer.plus(is_sample.and(covers).and(others.equals(objects).not()));
+    }
+    // nearer + others ≥ samples.
+    let enough = samples.plus(M8::splat(around.others)).less_than(nearer).not();
+    let all_but_few = nearer.less_than(M8::splat(-5i32 as u32)).and(enough);
+    candidates.and(all_but_few)
 }
