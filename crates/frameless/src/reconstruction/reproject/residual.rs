@@ -44,15 +44,17 @@ impl Reproject {
         let found = self.against_shown(sample, rgb, display.encode(kept.old[i]));
         let request = kept.requests[i];
         let (x, y) = kept.size.xy(request.pixel);
-        let central = self.store.central(x, y);
         if request == Request::centre(request.pixel)
-            && self.settled.count(request.pixel) > 0
-            && let Some(cell) = central
+            && let Some(cell) = self.store.central(x, y)
+            && self.settled.rests(self.store.object[cell])
         {
-            // The same ray as before: all that differs is change.
+            // The same ray as before: all that differs is change. (Against the picture, a mean of old samples would differ from
+            // every new one, be thought to change, and so remain a mean.)
             let before = std::array::from_fn(|k| self.store.rgb[k][cell]);
             let change = squared(rgb, before);
-            self.settled.verify(request.pixel, kept.new[i], change, kept.is_noisy);
+            if self.settled.count(request.pixel) > 0 {
+                self.settled.verify(request.pixel, kept.new[i], change, kept.is_noisy);
+            }
             return Found { change, outdated: change > 3.0 * OUTDATED, ..found };
         }
         if kept.is_noisy {
