@@ -3,8 +3,8 @@
 use thiserror::Error;
 
 use crate::{
-    Answer, Batch, Canvas, Clock, Display, Hold, Kept, Observation, Pose, Reconstruction, Refresh,
-    Request, Sampler, Size, Surface, Time, Timeline, Tracer,
+    Answer, Batch, Canvas, Clock, Display, Hold, Kept, Observation, Pose, Rates, Reconstruction,
+    Refresh, Request, Sampler, Size, Surface, Time, Timeline, Tracer,
 };
 
 /// Everything that runs a frameless picture: a clock, a sampler, a renderer, and the canvas between them.
@@ -146,6 +146,7 @@ impl<T: Tracer> Engine<T> {
     /// If the renderer's answer cannot be used. Its good samples before the bad one are kept, and the loop can
     /// go on.
     pub fn step(&mut self) -> Result<usize, EngineError> {
+        self.observations.clear();
         match &mut self.clock {
             Clock::Simulated(clock) => {
                 let (now, count) = clock.next_batch();
@@ -288,7 +289,7 @@ impl<T: Tracer> Engine<T> {
     pub fn refresh(&mut self, now: Time) -> &[[f32; 3]] {
         let (secs, size) = (self.timeline.scene_secs(now), self.canvas.size());
         let pose = self.tracer.pose(secs, size, &mut self.pose).then_some(&self.pose);
-        let rates = self.sampler.rates();
+        let rates = self.sampler.rates().filter(|rates| rates.size() == size);
         let refresh = Refresh { now, pose, display: &self.display, rates };
         self.reconstruction.refresh(&refresh, &mut self.canvas, &mut self.picture);
         &self.picture
@@ -304,9 +305,28 @@ impl<T: Tracer> Engine<T> {
         Ok(())
     }
 
-    /// Make pictures in another way from now on. What the canvas holds stays; surfaces are learned anew.
+    /// Make pictures in another way from now on. What the canvas holds stays in its place; surfaces are learned anew. Also
+    /// for a renderer that has been given another scene: surfaces of the one before mean nothing in it.
     pub fn set_reconstruction(&mut self, reconstruction: Box<dyn Reconstruction>) {
         self.reconstruction = reconstruction;
+        self.hand_over_canvas();
+    }
+
+    /// Gives the reconstruction what the canvas holds, as samples without surfaces, with their times.
+    fn hand_over_canvas(&mut self) {
+        let canvas = &self.canvas;
+        let time = |&pixel: &u32| canvas.time()[pixel as usize];
+        let all = 0..canvas.size().pixels() as u32;
+        let mut pixels: Vec<u32> = all.filter(|&pixel| canvas.known()[pixel as usize]).collect();
+        pixels.sort_unstable_by_key(time);
+        for batch in pixels.chunk_by(|a, b| time(a) == time(b)) {
+            let requests: Vec<Request> = batch.iter().copied().map(Request::centre).collect();
+            let rgb: Vec<[f32; 3]> = batch.iter().map(|&i| canvas.rgb()[i as usize]).collect();
+            let (now, size) = (time(&batch[0]), canvas.size());
+            let kept = Kept { now, size, requests: &requests, new: &rgb, old: &rgb, surfaces: &[] };
+            self.changes.clear();
+            self.reconstruction.keep(&kept, &self.display, &mut self.changes);
+        }
     }
 
     /// The present time of the engine's clock.
@@ -332,6 +352,17 @@ impl<T: Tracer> Engine<T> {
     /// Let somebody else choose the pixels; the picture stays.
     pub fn set_sampler(&mut self, sampler: Box<dyn Sampler>) {
         self.sampler = sampler;
+    }
+
+    /// What has been learned of how fast each part of the picture changes; `None` if the sampler learns no such thing, or
+    /// has not begun since the last change of size.
+    pub fn rates(&self) -> Option<&Rates> {
+        self.sampler.rates().filter(|rates| rates.size() == self.canvas.size())
+    }
+
+    /// What the sampler was told of the newest answer; empty if none has come in the last turn of the loop.
+    pub fn observations(&self) -> &[Observation] {
+        &self.observations
     }
 
     /// Trade temporal against spatial accuracy, see [`Sampler::set_temporal`].
@@ -383,6 +414,8 @@ impl<T: Tracer> Engine<T> {
     pub fn resize(&mut self, size: Size) {
         if size != self.canvas.size() {
             self.canvas = self.canvas.resized(size);
+            self.observations.clear();
+            self.hand_over_canvas();
         }
     }
 }

@@ -67,6 +67,7 @@ impl Reproject {
             self.store = Store::new(size, self.cells);
             self.refreshes = 0;
             self.shown.clear();
+            self.no_rates = None;
         }
     }
 }
