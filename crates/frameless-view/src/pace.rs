@@ -20,9 +20,6 @@ pub(crate) struct Pace {
     paint_secs: f64,
 }
 
-// The first batches are of a few samples, until the clock knows the renderer: a picture of them would show nothing, cost as
-// much as any, and put off the next.
-const FIRST_SECS: f64 = 0.1;
 // A little less than 1/60 s: where the display waits for its refresh, that sets the rate and not this.
 const SHORTEST_SECS: f64 = 0.015;
 // Slower than 20 Hz is felt as stutter, whatever it costs.
@@ -37,9 +34,9 @@ const LONGEST_REST_SECS: f64 = 1.0;
 const LEARNING_RATE: f64 = 0.1;
 
 impl Pace {
-    /// The first picture is due a moment after the start.
+    /// Due at once.
     pub(crate) fn new() -> Pace {
-        Pace { due: Time::from_secs(FIRST_SECS), paint_secs: 0.0 }
+        Pace { due: Time::ZERO, paint_secs: 0.0 }
     }
 
     /// Told what the window's last paint cost, in seconds without waiting for the display.
@@ -79,13 +76,6 @@ mod tests {
 
     fn due_in_a_second(pace: &mut Pace) -> usize {
         (1000..2000).filter(|&ms| pace.is_due(Time::from_secs(1e-3 * f64::from(ms)))).count()
-    }
-
-    #[test]
-    fn the_first_picture_has_more_than_a_few_samples() {
-        let mut pace = Pace::new();
-        assert!(!pace.is_due(Time::from_secs(0.05)));
-        assert!(pace.is_due(Time::from_secs(0.1)));
     }
 
     #[test]

@@ -87,8 +87,11 @@ fn run<S: Stage>(
         wake();
     };
     loop {
+        // Of the sizes that a window takes on while its border is dragged only the last matters, and each would cost a refresh.
+        let mut size = None;
         loop {
             match commands.try_recv() {
+                Ok(Command::Size(wanted)) => size = Some(wanted),
                 Ok(Command::WantPicture { memory, paint_secs }) => {
                     pace.painted(paint_secs);
                     wanted = Some(memory);
@@ -98,13 +101,16 @@ fn run<S: Stage>(
                 Err(TryRecvError::Disconnected) => return,
             }
         }
+        if let Some(size) = size {
+            session.apply(Command::Size(size));
+        }
         if let Err(error) = session.step()
             && session.now() >= next_error
         {
             next_error = Time::from_secs(session.now().secs() + SECS_BETWEEN_ERRORS);
             report(Report::Error(error.to_string()));
         }
-        if wanted.is_some() && pace.is_due(session.now()) {
+        if wanted.is_some() && session.is_worth_showing() && pace.is_due(session.now()) {
             let begin = session.now();
             let picture = session.picture(wanted.take().unwrap_or_default());
             let ready = session.now();

@@ -120,6 +120,13 @@ impl<S: Stage> Session<S> {
         }
     }
 
+    /// Whether there is more than the first few samples, or no hope of more soon. The first batches are tiny, until the clock
+    /// knows the renderer; a picture of them would show nothing, cost as much as any, and put off the next.
+    pub(crate) fn is_worth_showing(&self) -> bool {
+        let enough = self.engine.canvas().size().pixels() as u64 / PIXELS_PER_FIRST_SAMPLE;
+        self.engine.counters().kept >= enough || self.now() >= FIRST_PICTURE_AT_LATEST
+    }
+
     /// The picture now, in reused memory.
     pub(crate) fn picture(&mut self, memory: Vec<[u8; 4]>) -> Picture {
         let now = self.engine.now();
@@ -147,6 +154,11 @@ impl<S: Stage> Session<S> {
         Picture { size: self.engine.canvas().size(), rgba, status }
     }
 }
+
+// One sample in 16×16 pixels is a sketch of the picture.
+const PIXELS_PER_FIRST_SAMPLE: u64 = 256;
+// For renderers that need longer.
+const FIRST_PICTURE_AT_LATEST: Time = Time(500_000_000);
 
 /// 8 bits per channel of a display-referred colour, with alpha 255.
 fn rgba8(colour: [f32; 3]) -> [u8; 4] {
@@ -398,6 +410,18 @@ mod tests {
             assert!(calm < 1.0 && changed > 20.0, "{sampler:?}: {calm}, then {changed}");
             session.apply(Command::Size(Size::new(10, 10)));
             assert!(brightness(&mut session) < 1.0, "nothing is known of these pixels");
+        }
+    }
+
+    #[test]
+    fn the_first_picture_waits_for_a_sketch_but_not_for_a_slow_renderer() {
+        for (samples_per_sec, wait_secs) in [(100_000.0, 0.0), (1.0, 0.5)] {
+            let (size, clock) = (Size::new(64, 64), Clock::simulated(samples_per_sec));
+            let settings = Settings::default();
+            let mut session = Session::new(size, clock, settings, 1, Plain::new(1.0));
+            assert!(!session.is_worth_showing());
+            run(&mut session, wait_secs + 0.01);
+            assert!(session.is_worth_showing(), "at {samples_per_sec} samples/s");
         }
     }
 

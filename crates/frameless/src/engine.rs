@@ -315,14 +315,14 @@ impl<T: Tracer> Engine<T> {
     /// Gives the reconstruction what the canvas holds, as samples without surfaces, with their times.
     fn hand_over_canvas(&mut self) {
         let canvas = &self.canvas;
-        let time = |&pixel: &u32| canvas.time()[pixel as usize];
-        let all = 0..canvas.size().pixels() as u32;
-        let mut pixels: Vec<u32> = all.filter(|&pixel| canvas.known()[pixel as usize]).collect();
-        pixels.sort_unstable_by_key(time);
-        for batch in pixels.chunk_by(|a, b| time(a) == time(b)) {
-            let requests: Vec<Request> = batch.iter().copied().map(Request::centre).collect();
-            let rgb: Vec<[f32; 3]> = batch.iter().map(|&i| canvas.rgb()[i as usize]).collect();
-            let (now, size) = (time(&batch[0]), canvas.size());
+        let held = canvas.time().iter().zip(canvas.known()).zip(0u32..);
+        let held = held.filter(|((_, known), _)| **known).map(|((&time, _), pixel)| (time, pixel));
+        let mut held: Vec<(Time, u32)> = held.collect();
+        held.sort_unstable();
+        for batch in held.chunk_by(|(a, _), (b, _)| a == b) {
+            let requests: Vec<Request> = batch.iter().map(|&(_, i)| Request::centre(i)).collect();
+            let rgb: Vec<[f32; 3]> = batch.iter().map(|&(_, i)| canvas.rgb()[i as usize]).collect();
+            let (now, size) = (batch[0].0, canvas.size());
             let kept = Kept { now, size, requests: &requests, new: &rgb, old: &rgb, surfaces: &[] };
             self.changes.clear();
             self.reconstruction.keep(&kept, &self.display, &mut self.changes);
