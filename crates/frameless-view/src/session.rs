@@ -155,8 +155,8 @@ impl<S: Stage> Session<S> {
     }
 }
 
-// One sample in 16×16 pixels is a sketch of the picture.
-const PIXELS_PER_FIRST_SAMPLE: u64 = 256;
+// One sample in 8×8 pixels is a sketch of the picture.
+const PIXELS_PER_FIRST_SAMPLE: u64 = 64;
 // For renderers that need longer.
 const FIRST_PICTURE_AT_LATEST: Time = Time(500_000_000);
 
