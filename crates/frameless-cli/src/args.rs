@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Parser, Subcommand};
-use frameless::Size;
+use frameless::{ReconstructionKind, Size};
 
 use crate::parse;
 
@@ -18,8 +18,10 @@ const AFTER_HELP: &str = "\
 Examples:
   frameless
       the moving sphere, in a window
-  frameless view model.glb --sampler random
-      your own scene, pixels chosen at random
+  frameless view model.glb
+      your own scene
+  frameless view sphere --sampler random --reconstruction hold
+      as it began in 1994: pixels chosen at random, each shown until its next sample
   frameless compare experiments/figures.toml --out out/figures
       how good is it? numbers, a report with curves, pictures and a video
   frameless render sphere --time 0.5 -o sphere.png
@@ -59,16 +61,37 @@ pub(crate) enum Command {
 #[derive(ClapArgs)]
 #[command(after_help = "Examples:
   frameless view
-  frameless view model.glb --sampler change --rate 900000
+  frameless view model.glb --rate 900000 --temporal 0.8
+  frameless view sphere --sampler change --reconstruction hold
+      the algorithm of 2002
   frameless view sphere --size 512x384 --screenshot shot.png --after 3")]
 pub(crate) struct ViewArgs {
     /// A glTF file or a built-in scene
     #[arg(default_value = DEFAULT_SCENE)]
     pub(crate) scene: String,
 
-    /// Who chooses the pixels: random, permutation, change or adaptive
+    /// Who chooses the pixels [default: adaptive]
+    ///
+    /// random: any pixel. permutation: every pixel once, then again. change: where colours have just changed (the
+    /// sketch of 2002). adaptive: what has been uncovered, then moving edges, then where change has been learned to
+    /// be fast.
     #[arg(long, value_name = "NAME", value_parser = sampler_names())]
     pub(crate) sampler: Option<String>,
+
+    /// How the picture is made of the samples [default: reproject+relight+antialias]
+    ///
+    /// hold: each pixel shows its newest sample. filter: a mean of the samples around, the younger the heavier.
+    /// reproject: samples move with the surfaces that they hit; it may be followed by +relight (old samples are
+    /// shaded with the present lights), +deep (four samples per pixel) and +antialias (samples add up where nothing
+    /// moves).
+    #[arg(long, value_name = "NAME", value_parser = parse::reconstruction)]
+    pub(crate) reconstruction: Option<ReconstructionKind>,
+
+    /// What the sampler `adaptive` spends its samples on [default: 0.5]
+    ///
+    /// From 0 (spatial: finishing what is there) to 1 (temporal: following what moves).
+    #[arg(long, value_name = "0..1", value_parser = parse::fraction)]
+    pub(crate) temporal: Option<f32>,
 
     /// Trace a picture of always the same size in pixels, whatever the window's [default: as the window]
     #[arg(long, value_name = "WxH", value_parser = parse::size)]
@@ -114,6 +137,8 @@ impl Default for ViewArgs {
         ViewArgs {
             scene: DEFAULT_SCENE.into(),
             sampler: None,
+            reconstruction: None,
+            temporal: None,
             size: None,
             rate: None,
             camera: 0,
@@ -253,6 +278,10 @@ mod tests {
         assert_eq!(
             (typed.scene, typed.sampler, typed.size, typed.rate, typed.camera),
             (default.scene, default.sampler, default.size, default.rate, default.camera)
+        );
+        assert_eq!(
+            (typed.reconstruction, typed.temporal),
+            (default.reconstruction, default.temporal)
         );
         assert_eq!(
             (typed.exposure, typed.threads, typed.seed, typed.screenshot, typed.after),

@@ -1,6 +1,6 @@
 //! From the text of an argument to a checked value.
 
-use frameless::Size;
+use frameless::{ReconstructionKind, Size};
 
 /// Longest side of a picture: what GPUs take as a texture.
 const MAX_SIDE: u32 = 16_384;
@@ -42,6 +42,21 @@ pub(crate) fn positive(text: &str) -> Result<f64, String> {
         Ok(number) if number > 0.0 => Ok(number),
         _ => Err("wanted a number above zero".into()),
     }
+}
+
+/// A number from 0 to 1.
+pub(crate) fn fraction(text: &str) -> Result<f32, String> {
+    match finite(text) {
+        Ok(number) if (0.0..=1.0).contains(&number) => Ok(number as f32),
+        _ => Err("wanted a number from 0 to 1".into()),
+    }
+}
+
+/// A reconstruction by its name.
+pub(crate) fn reconstruction(text: &str) -> Result<ReconstructionKind, String> {
+    ReconstructionKind::from_name(text).ok_or_else(|| {
+        "wanted hold, filter or reproject, the last with +relight, +deep, +antialias as you like".into()
+    })
 }
 
 /// A number of seconds that a person might wait: above zero, at most a day.
@@ -89,11 +104,23 @@ mod tests {
     }
 
     #[test]
+    fn reconstructions() {
+        assert_eq!(reconstruction("hold"), Ok(ReconstructionKind::Hold));
+        let default = ReconstructionKind::default();
+        assert_eq!(reconstruction("reproject+relight+antialias"), Ok(default));
+        for bad in ["", "blur", "hold+deep", "reproject+"] {
+            assert!(reconstruction(bad).is_err_and(|error| error.contains("+antialias")), "{bad}");
+        }
+    }
+
+    #[test]
     fn numbers() {
         assert_eq!(finite("-2.5"), Ok(-2.5));
         assert!(["inf", "nan", "1e999", "", "x"].iter().all(|bad| finite(bad).is_err()));
         assert_eq!(positive("9e5"), Ok(9e5));
         assert!(["0", "-1", "inf", "nan"].iter().all(|bad| positive(bad).is_err()));
+        assert_eq!(["0", "0.25", "1"].map(fraction), [Ok(0.0), Ok(0.25), Ok(1.0)]);
+        assert!(["-0.1", "1.01", "nan", ""].iter().all(|bad| fraction(bad).is_err()));
         assert!(wait_secs("86401").is_err());
         assert_eq!(stops("-3"), Ok(-3.0));
         assert!(stops("65").is_err());

@@ -20,12 +20,13 @@ pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
     if let Some(screenshot) = &args.screenshot {
         output::check_png_path(screenshot)?;
     }
+    let settings = settings(args)?;
     let mut scene = input::scene(&args.scene)?;
     let first = input::camera(&scene, args.camera)?;
     // The window begins with the first camera.
     scene.cameras.rotate_left(first as usize);
     let mut options = ViewOptions::new(Arc::new(scene));
-    options.settings = settings(args);
+    options.settings = settings;
     options.threads = args.threads;
     options.seed = args.seed;
     let Some(screenshot) = &args.screenshot else { return Ok(frameless_view::run(options)?) };
@@ -43,17 +44,26 @@ pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
     Err(Failure::other(anyhow!("{shown} was not written: the window was closed too early")))
 }
 
-fn settings(args: &ViewArgs) -> Settings {
+fn settings(args: &ViewArgs) -> Result<Settings, Failure> {
     let default = Settings::default();
-    Settings {
-        sampler: args
-            .sampler
-            .as_deref()
-            .and_then(SamplerKind::from_name)
-            .unwrap_or(default.sampler),
+    let named = args.sampler.as_deref().and_then(SamplerKind::from_name);
+    let mut sampler = named.unwrap_or(default.sampler);
+    match (&mut sampler, args.temporal) {
+        (_, None) => {}
+        (SamplerKind::Adaptive { temporal }, Some(wanted)) => *temporal = wanted,
+        (other, Some(_)) => {
+            let name = other.name();
+            let error =
+                anyhow!("--temporal is for the sampler adaptive; {name} has no such choice");
+            return Err(Failure::bad_input(error));
+        }
+    }
+    Ok(Settings {
+        sampler,
+        reconstruction: args.reconstruction.unwrap_or(default.reconstruction),
         samples_per_sec: args.rate,
         exposure_stops: args.exposure,
         picture: args.size.map_or(default.picture, PictureSize::Fixed),
         ..default
-    }
+    })
 }

@@ -64,6 +64,10 @@ pub(crate) struct App {
 // The loop wakes the window for every picture; this is for when it has stopped, and for the spinner.
 const WAKE_AT_LEAST_SECS: f32 = 0.25;
 
+// One for each overlay.
+const DIGITS: [Key; 7] =
+    [Key::Num0, Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6];
+
 impl App {
     /// Starts the render loop.
     ///
@@ -233,8 +237,7 @@ impl App {
         if pressed(Key::Home) {
             self.look_through(self.own_camera);
         }
-        let digits = [Key::Num0, Key::Num1, Key::Num2, Key::Num3, Key::Num4];
-        for (key, overlay) in digits.into_iter().zip(Overlay::ALL) {
+        for (key, overlay) in DIGITS.into_iter().zip(Overlay::ALL) {
             if pressed(key) {
                 self.settings.overlay = overlay;
             }
@@ -302,7 +305,7 @@ impl App {
         }
     }
 
-    /// HUD, messages, and the heat map's legend.
+    /// HUD, messages, and the overlay's legend.
     fn write_over(&mut self, ui: &mut Ui, place: Rect, now_secs: f64) {
         let painter = ui.painter();
         let mut free = place;
@@ -315,7 +318,8 @@ impl App {
                 Some(Drawn::HeatMap(legend)) => legend::paint(painter, place.expand(10.0), legend),
                 Some(Drawn::Unknown) => {
                     let name = self.settings.sampler.name();
-                    let text = format!("sampler {name} has no {}", self.settings.overlay.name());
+                    let overlay = self.settings.overlay.name();
+                    let text = format!("sampler {name} has no {overlay}; adaptive has");
                     let line = [Line::plain(text)];
                     hud::paint(painter, Align2::LEFT_BOTTOM, place, &line);
                 }

@@ -69,8 +69,10 @@ pub(crate) struct Status {
     pub(crate) scene_secs: f64,
     /// Samples kept per second, over the last quarter of a second.
     pub(crate) samples_per_sec: f64,
+    /// Pictures made per second, over the same time.
+    pub(crate) pictures_per_sec: f64,
     /// How old the picture is.
     pub(crate) ages: Ages,
-    /// The heat map, where one was asked for.
+    /// The overlay, where one was asked for.
     pub(crate) overlay: Option<Drawn>,
 }

@@ -4,14 +4,16 @@ use eframe::egui::{Align2, Context, Grid, RichText, Window, vec2};
 
 use crate::theme;
 
-const KEYS: [(&str, &str); 12] = [
+const KEYS: [(&str, &str); 14] = [
     ("left drag", "orbit"),
     ("right or middle drag", "pan"),
     ("wheel", "zoom"),
     ("W A S D, Q E", "fly; with shift: fast"),
     ("double click, Home", "back to the scene's own camera"),
     ("space", "play or pause"),
-    ("0 1 2 3 4", "picture, change, age, tile probability, sampling rate"),
+    ("0", "the picture"),
+    ("1 2 3", "change, source age, tile probability"),
+    ("4 5 6", "sampling rate, learned rate, holes"),
     ("P", "hide or show the panels"),
     ("F12", "save the picture as PNG"),
     ("drop a .glb or .gltf", "open it"),

@@ -15,7 +15,7 @@ pub(crate) fn lines(status: &Status, size: Size, scene: &Scene) -> Vec<String> {
     let rate = status.samples_per_sec;
     let pixels = size.pixels();
     let mut lines = vec![
-        format!("{} samples/s", grouped(rate)),
+        format!("{} samples/s  {:.0} pictures/s", grouped(rate), status.pictures_per_sec),
         format!(
             "age    mean {}  max {}",
             millis(status.ages.mean_secs),
@@ -28,10 +28,8 @@ pub(crate) fn lines(status: &Status, size: Size, scene: &Scene) -> Vec<String> {
             false => format!("{}×{}, no samples", size.width, size.height),
         },
     ];
-    if status.ages.untraced > 0 {
-        let percent = 100.0 * status.ages.untraced as f64 / pixels as f64;
-        lines.push(format!("{percent:.0} % not traced yet"));
-    }
+    // Always there: a line that comes and goes would make those below it jump.
+    lines.push(format!("holes  {:.1} %", 100.0 * status.ages.unknown as f64 / pixels as f64));
     lines.extend(scene.notes.iter().map(|note| shortened(note)));
     match scene.warnings.len() {
         0 => {}
@@ -127,8 +125,14 @@ mod tests {
 
     #[test]
     fn the_hud_says_how_long_the_image_takes() {
-        let ages = Ages { mean_secs: 0.1, max_secs: 1.5, untraced: 0 };
-        let status = Status { scene_secs: 0.0, samples_per_sec: 100_000.0, ages, overlay: None };
+        let ages = Ages { mean_secs: 0.1, max_secs: 1.5, unknown: 60 };
+        let status = Status {
+            scene_secs: 0.0,
+            samples_per_sec: 100_000.0,
+            pictures_per_sec: 60.2,
+            ages,
+            overlay: None,
+        };
         let scene = Scene {
             notes: vec!["no light: added one".to_owned()],
             warnings: vec![String::new(); 2],
@@ -138,9 +142,10 @@ mod tests {
         assert_eq!(
             lines,
             [
-                "100,000 samples/s",
+                "100,000 samples/s  60 pictures/s",
                 "age    mean 100 ms  max 1,500 ms",
                 "covers 200×100 in 200 ms",
+                "holes  0.3 %",
                 "no light: added one",
                 "2 warnings"
             ]

@@ -1,9 +1,11 @@
-//! The colour bar below a heat map: which number has which colour.
+//! What the colours of an overlay mean: the colour bar of a heat map, or a name beside each colour.
 
-use eframe::egui::{Align2, Color32, CornerRadius, FontId, Mesh, Painter, Rect, Shape, pos2, vec2};
+use eframe::egui::{
+    Align2, Color32, CornerRadius, FontId, Mesh, Painter, Pos2, Rect, Shape, pos2, vec2,
+};
 
-use crate::heatmap;
-use crate::overlay::Legend;
+use crate::heatmap::{self, Scale};
+use crate::overlay::{Colours, Legend};
 use crate::theme;
 
 const WIDTH: f32 = 280.0;
@@ -11,13 +13,12 @@ const BAR_HEIGHT: f32 = 10.0;
 // One quad per 8 points: between them the driver interpolates, which no eye can tell from the map itself.
 const COLUMNS: usize = 35;
 
-/// Draws the bar at the bottom left of `place`.
+/// Draws the legend at the bottom left of `place`.
 pub(crate) fn paint(painter: &Painter, place: Rect, legend: &Legend) {
     let size = vec2(WIDTH + 32.0, 56.0);
     let corner = place.left_bottom() + vec2(10.0, -10.0 - size.y);
     let background = Rect::from_min_size(corner, size);
     painter.rect_filled(background, CornerRadius::same(4), theme::SCRIM);
-    let bar = Rect::from_min_size(corner + vec2(16.0, 24.0), vec2(WIDTH, BAR_HEIGHT));
     painter.text(
         corner + vec2(16.0, 6.0),
         Align2::LEFT_TOP,
@@ -25,11 +26,31 @@ pub(crate) fn paint(painter: &Painter, place: Rect, legend: &Legend) {
         FontId::proportional(12.0),
         theme::TEXT,
     );
+    match &legend.colours {
+        Colours::Scale(scale) => paint_scale(painter, corner + vec2(16.0, 24.0), scale),
+        Colours::Names(names) => paint_names(painter, corner + vec2(16.0, 30.0), names),
+    }
+}
+
+fn paint_scale(painter: &Painter, corner: Pos2, scale: &Scale) {
+    let bar = Rect::from_min_size(corner, vec2(WIDTH, BAR_HEIGHT));
     painter.add(Shape::mesh(colours(bar)));
-    for (at, value) in legend.scale.ticks() {
+    for (at, value) in scale.ticks() {
         let below = pos2(bar.left() + at * bar.width(), bar.bottom() + 3.0);
         let align = Align2::CENTER_TOP;
         painter.text(below, align, number(value), FontId::monospace(11.0), theme::TEXT);
+    }
+}
+
+fn paint_names(painter: &Painter, corner: Pos2, names: &[([u8; 4], &str)]) {
+    let mut corner = corner;
+    for ([r, g, b, _], name) in names {
+        let swatch = Rect::from_min_size(corner, vec2(BAR_HEIGHT, BAR_HEIGHT));
+        painter.rect_filled(swatch, CornerRadius::ZERO, Color32::from_rgb(*r, *g, *b));
+        let beside = swatch.right_center() + vec2(5.0, 0.0);
+        let font = FontId::proportional(12.0);
+        let written = painter.text(beside, Align2::LEFT_CENTER, *name, font, theme::TEXT);
+        corner.x = written.right() + 14.0;
     }
 }
 

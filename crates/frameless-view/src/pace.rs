@@ -1,7 +1,9 @@
-//! How often the window is painted.
+//! How often a picture is made and painted.
 //!
-//! The display's rate where painting is cheap. Where it is not (software rendering on few cores takes 10 ms and
-//! more), a fixed share of one core: what the window takes, the picture loses.
+//! The display's rate where both are cheap. Where painting is not (software rendering on few cores takes 10 ms and
+//! more), a fixed share of one core: what the window takes, the picture loses. Where making the picture of the samples is
+//! not, a fixed share of the render loop's time: no samples come meanwhile, and a slow refresh should lower the rate of
+//! pictures rather than that of samples.
 
 use frameless::Time;
 
@@ -23,7 +25,11 @@ const SHORTEST_SECS: f64 = 0.015;
 // Slower than 20 Hz is felt as stutter, whatever it costs.
 const LONGEST_SECS: f64 = 1.0 / 20.0;
 // Of one core, for painting.
-const SHARE: f64 = 0.25;
+const PAINT_SHARE: f64 = 0.25;
+// Of the loop's time, for making pictures. More starves the samples of which they are made.
+const REFRESH_SHARE: f64 = 1.0 / 3.0;
+// Whatever a picture costs, the next comes after this at the latest.
+const LONGEST_REST_SECS: f64 = 1.0;
 // Of the newest paint in the learned cost: one slow paint is no reason to slow down.
 const LEARNING_RATE: f64 = 0.1;
 
@@ -40,6 +46,14 @@ impl Pace {
         }
     }
 
+    /// Told when a picture is ready, and what making it cost in seconds of the render loop. The samples get their share before
+    /// the next one: at once and not on average, since the first pictures of a large window cost most.
+    pub(crate) fn made(&mut self, now: Time, refresh_secs: f64) {
+        let rest_secs = refresh_secs * (1.0 / REFRESH_SHARE - 1.0);
+        let rested = Time::from_secs(now.secs() + rest_secs.min(LONGEST_REST_SECS));
+        self.due = self.due.max(rested);
+    }
+
     /// Whether a picture is due; if so, the next one is due an interval later.
     pub(crate) fn is_due(&mut self, now: Time) -> bool {
         if now < self.due {
@@ -50,9 +64,9 @@ impl Pace {
         true
     }
 
-    /// Seconds between two pictures.
+    /// Seconds between two pictures, as far as painting goes.
     pub(crate) fn interval_secs(&self) -> f64 {
-        (self.paint_secs / SHARE).clamp(SHORTEST_SECS, LONGEST_SECS)
+        (self.paint_secs / PAINT_SHARE).clamp(SHORTEST_SECS, LONGEST_SECS)
     }
 }
 
@@ -61,7 +75,7 @@ mod tests {
     use super::*;
 
     fn due_in_a_second(pace: &mut Pace) -> usize {
-        (0..1000).filter(|&ms| pace.is_due(Time::from_secs(1e-3 * f64::from(ms)))).count()
+        (1000..2000).filter(|&ms| pace.is_due(Time::from_secs(1e-3 * f64::from(ms)))).count()
     }
 
     #[test]
@@ -81,5 +95,28 @@ mod tests {
         assert_eq!(pace.interval_secs(), LONGEST_SECS);
         pace.painted(f64::NAN);
         assert_eq!(pace.interval_secs(), LONGEST_SECS);
+    }
+
+    #[test]
+    fn dear_refreshes_leave_the_samples_two_thirds_of_the_loop() {
+        let made_in_a_second = |refresh_ms: u64| {
+            let (mut pace, mut now, mut made) = (Pace::new(), Time::from_secs(1.0), 0);
+            while now < Time::from_secs(2.0) {
+                now.0 += 1_000_000;
+                if pace.is_due(now) {
+                    now.0 += refresh_ms * 1_000_000;
+                    pace.made(now, 1e-3 * refresh_ms as f64);
+                    made += 1;
+                }
+            }
+            made
+        };
+        assert!((59..=67).contains(&made_in_a_second(1)));
+        assert!((11..=12).contains(&made_in_a_second(30)));
+        // The very first already.
+        assert_eq!(made_in_a_second(300), 2);
+        let mut pace = Pace::new();
+        pace.made(Time::ZERO, 60.0);
+        assert!(pace.is_due(Time::from_secs(LONGEST_REST_SECS)));
     }
 }

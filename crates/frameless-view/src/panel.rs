@@ -3,7 +3,9 @@
 use eframe::egui::{
     Align, ComboBox, Key, Layout, RichText, ScrollArea, Slider, TextEdit, Ui, Widget, vec2,
 };
-use frameless::{DEFAULT_TILE, DEFAULT_W_D, SamplerKind, Size};
+use frameless::{
+    DEFAULT_TILE, DEFAULT_W_D, ReconstructionKind, ReprojectOptions, SamplerKind, Size,
+};
 use frameless_scene::Scene;
 
 use crate::settings::{Overlay, PictureSize, Settings};
@@ -12,8 +14,11 @@ use crate::settings::{Overlay, PictureSize, Settings};
 pub(crate) struct PanelState {
     /// What is typed into the field for a file.
     path: String,
-    /// The parameters of sampler `change`, while another one runs.
+    /// The parameters of the samplers that have some, while another one runs.
     change: SamplerKind,
+    adaptive: SamplerKind,
+    /// The options of `reproject`, while another reconstruction runs.
+    reproject: ReconstructionKind,
     /// The slider of the budget, while there is none.
     samples_per_sec: f64,
 }
@@ -22,7 +27,13 @@ impl Default for PanelState {
     fn default() -> Self {
         // The sketch's rate, so that ticking the box shows what it was about.
         let samples_per_sec = 900_000.0;
-        PanelState { path: String::new(), change: SamplerKind::CHANGE, samples_per_sec }
+        PanelState {
+            path: String::new(),
+            change: SamplerKind::CHANGE,
+            adaptive: SamplerKind::ADAPTIVE,
+            reproject: ReconstructionKind::default(),
+            samples_per_sec,
+        }
     }
 }
 
@@ -53,16 +64,15 @@ pub(crate) fn show(
         wish = scene_part(ui, state, scene, camera);
         section(ui, "Sampler");
         sampler_part(ui, state, settings);
+        section(ui, "Reconstruction");
+        reconstruction_part(ui, state, settings);
         section(ui, "Rays");
         budget_part(ui, state, settings);
         section(ui, "Picture");
         picture_part(ui, settings);
         section(ui, "Show");
-        for overlay in Overlay::ALL {
-            let name = if overlay == Overlay::None { "the picture" } else { overlay.name() };
-            ui.radio_value(&mut settings.overlay, overlay, name);
-        }
-        section(ui, "");
+        show_part(ui, settings);
+        ui.add_space(6.0);
         ui.horizontal(|ui| {
             if ui.button("Save PNG").on_hover_text("F12").clicked() {
                 wish = Some(Wish::Save);
@@ -77,9 +87,7 @@ pub(crate) fn show(
 
 fn section(ui: &mut Ui, title: &str) {
     ui.add_space(6.0);
-    if !title.is_empty() {
-        ui.label(RichText::new(title).small().weak());
-    }
+    ui.label(RichText::new(title).small().weak());
 }
 
 /// A label in a column of its own, and a widget beside it.
@@ -141,22 +149,104 @@ fn camera_name(scene: &Scene, camera: u32) -> String {
 }
 
 fn sampler_part(ui: &mut Ui, state: &mut PanelState, settings: &mut Settings) {
-    if matches!(settings.sampler, SamplerKind::Change { .. }) {
-        state.change = settings.sampler;
+    match settings.sampler {
+        SamplerKind::Change { .. } => state.change = settings.sampler,
+        SamplerKind::Adaptive { .. } => state.adaptive = settings.sampler,
+        SamplerKind::Random | SamplerKind::Permutation => {}
     }
     ComboBox::from_id_salt("sampler")
         .selected_text(settings.sampler.name())
         .width(ui.available_width())
         .show_ui(ui, |ui| {
-            for kind in [SamplerKind::Random, SamplerKind::Permutation, state.change] {
-                ui.selectable_value(&mut settings.sampler, kind, kind.name());
+            let kinds =
+                [state.adaptive, state.change, SamplerKind::Permutation, SamplerKind::Random];
+            for kind in kinds {
+                let choice = ui.selectable_value(&mut settings.sampler, kind, kind.name());
+                choice.on_hover_text(sampler_hint(kind));
             }
-        });
-    if let SamplerKind::Change { w_d, tile } = &mut settings.sampler {
-        let hint = format!("weight of change against age; {DEFAULT_W_D} unless set");
-        row(ui, "w_d", &hint, fraction(Slider::new(w_d, 0.0..=1.0)));
-        let hint = format!("side of a tile in pixels; {DEFAULT_TILE} unless set");
-        row(ui, "tile", &hint, Slider::new(tile, 1..=64).logarithmic(true).suffix(" px"));
+        })
+        .response
+        .on_hover_text("who chooses the pixels that are traced next");
+    match &mut settings.sampler {
+        SamplerKind::Change { w_d, tile } => {
+            let hint = format!("weight of change against age; {DEFAULT_W_D} unless set");
+            row(ui, "w_d", &hint, fraction(Slider::new(w_d, 0.0..=1.0)));
+            let hint = format!("side of a tile in pixels; {DEFAULT_TILE} unless set");
+            row(ui, "tile", &hint, Slider::new(tile, 1..=64).logarithmic(true).suffix(" px"));
+        }
+        SamplerKind::Adaptive { temporal } => temporal_row(ui, temporal),
+        SamplerKind::Random | SamplerKind::Permutation => {}
+    }
+}
+
+fn sampler_hint(kind: SamplerKind) -> &'static str {
+    match kind {
+        SamplerKind::Random => "any pixel, each time anew (Bishop et al. 1994)",
+        SamplerKind::Permutation => "every pixel once, in random order; then again",
+        SamplerKind::Change { .. } => "where colours have just changed (the sketch of 2002)",
+        SamplerKind::Adaptive { .. } => {
+            "what has been uncovered first, then moving edges, then where change has been learned to be fast"
+        }
+    }
+}
+
+/// A slider between two words.
+fn temporal_row(ui: &mut Ui, temporal: &mut f32) {
+    let hint = "what samples are spent on: to the left on finishing what is there, to the right on following what moves. \
+                What has been learned stays";
+    ui.horizontal(|ui| {
+        ui.label("spatial").on_hover_text(hint);
+        ui.add(Slider::new(temporal, 0.0..=1.0).show_value(false)).on_hover_text(hint);
+        ui.label("temporal").on_hover_text(hint);
+    });
+}
+
+fn reconstruction_part(ui: &mut Ui, state: &mut PanelState, settings: &mut Settings) {
+    if matches!(settings.reconstruction, ReconstructionKind::Reproject(_)) {
+        state.reproject = settings.reconstruction;
+    }
+    let kinds = [
+        (state.reproject, "samples move with the surfaces that they hit"),
+        (ReconstructionKind::Filter, "the mean of the samples around, the younger the heavier"),
+        (ReconstructionKind::Hold, "each pixel shows its newest sample, however old"),
+    ];
+    ui.horizontal(|ui| {
+        for (kind, hint) in kinds {
+            let name = reconstruction_name(kind);
+            ui.radio_value(&mut settings.reconstruction, kind, name).on_hover_text(hint);
+        }
+    });
+    if let ReconstructionKind::Reproject(options) = &mut settings.reconstruction {
+        reproject_options(ui, options);
+    }
+}
+
+/// Without its options.
+fn reconstruction_name(kind: ReconstructionKind) -> &'static str {
+    match kind {
+        ReconstructionKind::Hold => "hold",
+        ReconstructionKind::Filter => "filter",
+        ReconstructionKind::Reproject(_) => "reproject",
+    }
+}
+
+fn reproject_options(ui: &mut Ui, options: &mut ReprojectOptions) {
+    ui.horizontal(|ui| {
+        ui.checkbox(&mut options.relight, "relight").on_hover_text(
+            "shade old samples with the present lights: a switched lamp shows at once",
+        );
+        ui.checkbox(&mut options.antialias, "antialias")
+            .on_hover_text("where nothing moves, samples add up to smooth edges");
+        ui.checkbox(&mut options.deep, "deep").on_hover_text(
+            "up to four samples per pixel: smoother in motion, at four times the cost of a picture",
+        );
+    });
+}
+
+fn show_part(ui: &mut Ui, settings: &mut Settings) {
+    for (digit, overlay) in Overlay::ALL.into_iter().enumerate() {
+        ui.radio_value(&mut settings.overlay, overlay, overlay.name())
+            .on_hover_text(format!("{} (key {digit})", overlay.explanation()));
     }
 }
 

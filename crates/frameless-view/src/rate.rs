@@ -1,4 +1,4 @@
-//! How often each pixel is traced: a renderer that counts its answers.
+//! How often each pixel is traced: a renderer that counts its answers, and knows which scene they are of.
 
 use frameless::{Answer, Batch, Lighting, Pose, Size, Time, Tracer};
 
@@ -66,12 +66,15 @@ pub(crate) struct Counted<T> {
     /// The renderer itself.
     pub(crate) tracer: T,
     rate: Option<SamplingRate>,
+    // The next batch's number, and the first that shows the present scene.
+    next: u64,
+    first_of_scene: u64,
 }
 
 impl<T> Counted<T> {
     /// Not counting yet.
     pub(crate) fn new(tracer: T) -> Counted<T> {
-        Counted { tracer, rate: None }
+        Counted { tracer, rate: None, next: 0, first_of_scene: 0 }
     }
 
     /// The rate up to `now`; counting begins with the first call, and anew when the size changes.
@@ -82,6 +85,11 @@ impl<T> Counted<T> {
         rate
     }
 
+    /// The renderer has been given another scene: what batches under way have hit is not in it.
+    pub(crate) fn begin_scene(&mut self) {
+        self.first_of_scene = self.next;
+    }
+
     /// Nobody looks any longer.
     pub(crate) fn stop_counting(&mut self) {
         self.rate = None;
@@ -90,11 +98,15 @@ impl<T> Counted<T> {
 
 impl<T: Tracer> Tracer for Counted<T> {
     fn submit(&mut self, batch: Batch) {
+        self.next = batch.id + 1;
         self.tracer.submit(batch)
     }
 
     fn collect(&mut self, wait: bool) -> Option<Answer> {
-        let answer = self.tracer.collect(wait)?;
+        let mut answer = self.tracer.collect(wait)?;
+        if answer.batch < self.first_of_scene {
+            answer.surfaces.clear();
+        }
         if let Some(rate) = &mut self.rate {
             rate.count(&answer);
         }
@@ -116,7 +128,7 @@ impl<T: Tracer> Tracer for Counted<T> {
 
 #[cfg(test)]
 mod tests {
-    use frameless::{Function, Request};
+    use frameless::{Function, Request, Surface};
 
     use super::*;
 
@@ -166,5 +178,41 @@ mod tests {
         trace(&mut counted, Time::ZERO, Size::new(9, 9), &[0, 80]);
         let rate = counted.rate(Time::from_secs(1.0), Size::new(2, 2));
         assert_eq!(rate.per_sec().sum::<f32>(), 0.0);
+    }
+
+    #[test]
+    fn surfaces_of_a_scene_that_is_gone_are_left_out() {
+        let nothing = Surface {
+            object: Surface::SKY,
+            primitive: 0,
+            position: [0.0; 3],
+            normal: [0.0; 3],
+            albedo: [0.0; 3],
+            direct: [0.0; 3],
+            lit: 0,
+        };
+        let mut counted = Counted::new(Sky(nothing, Vec::new()));
+        let batch = |id| {
+            let (requests, size) = (vec![Request::centre(0)], Size::new(1, 1));
+            Batch { id, now: Time::ZERO, scene_secs: 0.0, size, requests }
+        };
+        counted.submit(batch(0));
+        counted.begin_scene();
+        counted.submit(batch(1));
+        let mut surfaces = || counted.collect(true).map(|answer| answer.surfaces.len());
+        assert_eq!([surfaces(), surfaces(), surfaces()], [Some(1), Some(0), None]);
+    }
+
+    /// Answers the newest batch first.
+    struct Sky(Surface, Vec<Answer>);
+
+    impl Tracer for Sky {
+        fn submit(&mut self, batch: Batch) {
+            self.1.push(Answer::to(batch, vec![[0.0; 3]], vec![self.0]));
+        }
+
+        fn collect(&mut self, _wait: bool) -> Option<Answer> {
+            self.1.pop()
+        }
     }
 }

@@ -87,8 +87,11 @@ fn run<S: Stage>(
         wake();
     };
     loop {
+        // Of the sizes that a window takes on while its border is dragged only the last matters, and each would cost a refresh.
+        let mut size = None;
         loop {
             match commands.try_recv() {
+                Ok(Command::Size(wanted)) => size = Some(wanted),
                 Ok(Command::WantPicture { memory, paint_secs }) => {
                     pace.painted(paint_secs);
                     wanted = Some(memory);
@@ -98,14 +101,21 @@ fn run<S: Stage>(
                 Err(TryRecvError::Disconnected) => return,
             }
         }
+        if let Some(size) = size {
+            session.apply(Command::Size(size));
+        }
         if let Err(error) = session.step()
             && session.now() >= next_error
         {
             next_error = Time::from_secs(session.now().secs() + SECS_BETWEEN_ERRORS);
             report(Report::Error(error.to_string()));
         }
-        if wanted.is_some() && pace.is_due(session.now()) {
-            report(Report::Picture(session.picture(wanted.take().unwrap_or_default())));
+        if wanted.is_some() && session.is_worth_showing() && pace.is_due(session.now()) {
+            let begin = session.now();
+            let picture = session.picture(wanted.take().unwrap_or_default());
+            let ready = session.now();
+            pace.made(ready, ready.secs_since(begin));
+            report(Report::Picture(picture));
         }
     }
 }
@@ -145,7 +155,7 @@ mod tests {
     #[test]
     fn a_wish_is_answered_once_and_the_loop_goes_on() {
         let thread = start();
-        while picture(&thread).status.ages.untraced > 0 {}
+        while picture(&thread).status.ages.unknown > 0 {}
         assert!(picture(&thread).rgba.iter().all(|&pixel| pixel == [255; 4]));
         std::thread::sleep(std::time::Duration::from_millis(60));
         assert!(matches!(thread.report(), Ok(None)), "nobody asked");
@@ -154,7 +164,7 @@ mod tests {
     #[test]
     fn a_renderer_that_fails_is_said_and_the_picture_stays() {
         let thread = start();
-        while picture(&thread).status.ages.untraced > 0 {}
+        while picture(&thread).status.ages.unknown > 0 {}
         thread.send(Command::Scene(f32::NAN));
         let Ok(Report::Error(text)) = next(&thread) else { panic!("no error") };
         assert!(text.contains("not finite"), "{text}");

@@ -2,7 +2,9 @@
 //!
 //! No thread and no window here: see `render_thread.rs`.
 
-use frameless::{Clock, Display, Engine, EngineError, Size, Time, Tracer};
+use frameless::{
+    Clock, Display, Engine, EngineError, ReconstructionKind, SamplerKind, Size, Time, Tracer,
+};
 
 use crate::command::{Command, Picture, Status, ViewChoice};
 use crate::overlay::HeatMaps;
@@ -27,7 +29,7 @@ pub(crate) struct Session<S> {
     engine: Engine<Counted<S>>,
     settings: Settings,
     seed: u64,
-    shown: Shown,
+    held: Shown,
     heat_maps: HeatMaps,
     throughput: Throughput,
 }
@@ -39,14 +41,20 @@ impl<S: Stage> Session<S> {
         let mut engine = Engine::new(size, clock, sampler, Counted::new(stage));
         engine.set_budget(settings.samples_per_sec);
         engine.set_display(Display::new(settings.exposure_stops));
-        let shown = Shown::new(engine.canvas(), *engine.display());
+        engine.set_reconstruction(settings.reconstruction.build());
+        let held = Shown::new(engine.canvas(), *engine.display());
         let (heat_maps, throughput) = (HeatMaps::default(), Throughput::default());
-        Session { engine, settings, seed, shown, heat_maps, throughput }
+        Session { engine, settings, seed, held, heat_maps, throughput }
     }
 
     /// One turn of the loop.
     pub(crate) fn step(&mut self) -> Result<usize, EngineError> {
-        self.engine.step()
+        let outcome = self.engine.step();
+        if self.settings.overlay == Overlay::Change {
+            let size = self.engine.canvas().size();
+            self.heat_maps.note_changes(size, self.engine.observations());
+        }
+        outcome
     }
 
     /// The present time of the engine's clock.
@@ -61,14 +69,17 @@ impl<S: Stage> Session<S> {
             Command::Settings(settings) => self.set(settings),
             Command::Size(size) => {
                 self.engine.resize(size);
-                self.shown.forget();
+                self.heat_maps.forget_changes();
             }
             Command::View(view) => self.engine.tracer_mut().tracer.set_view(view),
             Command::Scene(world) => {
-                let stage = &mut self.engine.tracer_mut().tracer;
-                stage.set_world(world);
-                stage.set_view(ViewChoice::Camera(0));
+                let renderer = self.engine.tracer_mut();
+                renderer.begin_scene();
+                renderer.tracer.set_world(world);
+                renderer.tracer.set_view(ViewChoice::Camera(0));
                 self.engine.timeline_mut().seek(now, 0.0);
+                // The old scene's surfaces are not in the new one.
+                self.engine.set_reconstruction(self.settings.reconstruction.build());
             }
             Command::Play(true) => self.engine.timeline_mut().play(now),
             Command::Play(false) => self.engine.timeline_mut().pause(now),
@@ -81,10 +92,16 @@ impl<S: Stage> Session<S> {
     /// Applies what differs, so that moving one slider does not make the sampler forget what it has learned.
     fn set(&mut self, new: Settings) {
         let old = std::mem::replace(&mut self.settings, new);
-        if new.sampler != old.sampler {
-            // Another seed than before: a sampler chosen again does not repeat itself.
-            self.seed = self.seed.wrapping_add(1);
-            self.engine.set_sampler(new.sampler.build(self.seed));
+        match (old.sampler, new.sampler) {
+            (SamplerKind::Adaptive { .. }, SamplerKind::Adaptive { temporal }) => {
+                self.engine.set_temporal(temporal);
+            }
+            (old, new) if old == new => {}
+            (_, new) => {
+                // Another seed than before: a sampler chosen again does not repeat itself.
+                self.seed = self.seed.wrapping_add(1);
+                self.engine.set_sampler(new.build(self.seed));
+            }
         }
         if new.samples_per_sec != old.samples_per_sec {
             self.engine.set_budget(new.samples_per_sec);
@@ -92,22 +109,45 @@ impl<S: Stage> Session<S> {
         if new.exposure_stops != old.exposure_stops {
             self.engine.set_display(Display::new(new.exposure_stops));
         }
+        if new.reconstruction != old.reconstruction {
+            self.engine.set_reconstruction(new.reconstruction.build());
+        }
         if new.overlay != Overlay::SamplingRate {
             self.engine.tracer_mut().stop_counting();
         }
+        if new.overlay != Overlay::Change {
+            self.heat_maps.forget_changes();
+        }
+    }
+
+    /// Whether there is more than the first few samples, or no hope of more soon. The first batches are tiny, until the clock
+    /// knows the renderer; a picture of them would show nothing, cost as much as any, and put off the next.
+    pub(crate) fn is_worth_showing(&self) -> bool {
+        let enough = self.engine.canvas().size().pixels() as u64 / PIXELS_PER_FIRST_SAMPLE;
+        self.engine.counters().kept >= enough || self.now() >= FIRST_PICTURE_AT_LATEST
     }
 
     /// The picture now, in reused memory.
     pub(crate) fn picture(&mut self, memory: Vec<[u8; 4]>) -> Picture {
         let now = self.engine.now();
-        self.shown.update(self.engine.canvas(), *self.engine.display());
         let mut rgba = memory;
         rgba.clear();
-        rgba.extend_from_slice(self.shown.rgba());
+        match self.settings.reconstruction {
+            // Only what is new has changed.
+            ReconstructionKind::Hold => {
+                self.held.update(self.engine.canvas(), *self.engine.display());
+                rgba.extend_from_slice(self.held.rgba());
+            }
+            ReconstructionKind::Filter | ReconstructionKind::Reproject(_) => {
+                rgba.extend(self.engine.refresh(now).iter().map(|&colour| rgba8(colour)));
+            }
+        }
         let overlay = self.heat_maps.draw(self.settings.overlay, &mut self.engine, &mut rgba);
+        let throughput = self.throughput.update(now, self.engine.counters().kept);
         let status = Status {
             scene_secs: self.engine.timeline().scene_secs(now),
-            samples_per_sec: self.throughput.update(now, self.engine.counters().kept),
+            samples_per_sec: throughput.samples_per_sec,
+            pictures_per_sec: throughput.pictures_per_sec,
             ages: shown::ages(self.engine.canvas(), now),
             overlay,
         };
@@ -115,25 +155,41 @@ impl<S: Stage> Session<S> {
     }
 }
 
-/// Samples per second over the last stretch of at least [`STRETCH_SECS`].
+// One sample in 8×8 pixels is a sketch of the picture.
+const PIXELS_PER_FIRST_SAMPLE: u64 = 64;
+// For renderers that need longer.
+const FIRST_PICTURE_AT_LATEST: Time = Time(500_000_000);
+
+/// 8 bits per channel of a display-referred colour, with alpha 255.
+fn rgba8(colour: [f32; 3]) -> [u8; 4] {
+    let [r, g, b] = colour.map(Display::quantize);
+    [r, g, b, 255]
+}
+
+/// Samples and pictures per second over the last stretch of at least [`STRETCH_SECS`].
 #[derive(Clone, Copy, Debug, Default)]
 struct Throughput {
     since: Time,
     kept: u64,
-    per_sec: f64,
+    pictures: u32,
+    samples_per_sec: f64,
+    pictures_per_sec: f64,
 }
 
 // Shorter and the number flickers, longer and it lags behind the slider.
 const STRETCH_SECS: f64 = 0.25;
 
 impl Throughput {
-    fn update(&mut self, now: Time, kept: u64) -> f64 {
+    /// Told at every picture how many samples have been kept so far.
+    fn update(&mut self, now: Time, kept: u64) -> Throughput {
+        self.pictures += 1;
         let secs = now.secs_since(self.since);
         if secs >= STRETCH_SECS {
-            let per_sec = (kept - self.kept) as f64 / secs;
-            *self = Throughput { since: now, kept, per_sec };
+            let samples_per_sec = (kept - self.kept) as f64 / secs;
+            let pictures_per_sec = f64::from(self.pictures) / secs;
+            *self = Throughput { since: now, kept, pictures: 0, samples_per_sec, pictures_per_sec };
         }
-        self.per_sec
+        *self
     }
 }
 
@@ -145,9 +201,17 @@ mod tests {
     use crate::overlay::Drawn;
     use crate::test_stage::Plain;
 
+    const KINDS: [ReconstructionKind; 3] =
+        [ReconstructionKind::Hold, ReconstructionKind::Filter, ReconstructionKind::REPROJECT];
+
     /// A session with every pixel traced at least once.
     fn white_session() -> Session<Plain> {
-        let settings = Settings { sampler: SamplerKind::Permutation, ..Settings::default() };
+        white_session_with(ReconstructionKind::default())
+    }
+
+    fn white_session_with(reconstruction: ReconstructionKind) -> Session<Plain> {
+        let sampler = SamplerKind::Permutation;
+        let settings = Settings { sampler, reconstruction, ..Settings::default() };
         let clock = Clock::simulated(100_000.0);
         let mut session = Session::new(Size::new(40, 30), clock, settings, 1, Plain::new(1.0));
         run(&mut session, 0.1);
@@ -178,6 +242,10 @@ mod tests {
             session.apply(Command::Settings(Settings { sampler, ..before }));
             assert_eq!(brightness(&mut session), 255.0, "{sampler:?}");
         }
+        for reconstruction in KINDS {
+            session.apply(Command::Settings(Settings { reconstruction, ..before }));
+            assert_eq!(brightness(&mut session), 255.0, "{reconstruction:?}");
+        }
         let budget = Settings { samples_per_sec: Some(1000.0), ..before };
         session.apply(Command::Settings(budget));
         session.apply(Command::View(ViewChoice::Camera(1)));
@@ -190,40 +258,84 @@ mod tests {
 
     #[test]
     fn the_picture_survives_a_resize() {
-        let mut session = white_session();
-        session.apply(Command::Size(Size::new(77, 13)));
-        assert_eq!(session.picture(Vec::new()).size, Size::new(77, 13));
-        assert_eq!(brightness(&mut session), 255.0);
+        for (sampler, reconstruction) in KINDS.map(|kind| (SamplerKind::ADAPTIVE, kind)) {
+            let mut session = white_session_with(reconstruction);
+            session.apply(Command::Settings(Settings { sampler, ..session.settings }));
+            run(&mut session, 0.05);
+            session.apply(Command::Size(Size::new(77, 13)));
+            // At once: nothing has been chosen yet in the new size.
+            assert_eq!(session.picture(Vec::new()).size, Size::new(77, 13));
+            assert_eq!(brightness(&mut session), 255.0, "{reconstruction:?}");
+            run(&mut session, 0.05);
+            assert_eq!(brightness(&mut session), 255.0, "{reconstruction:?}");
+        }
     }
 
     #[test]
     fn another_scene_takes_the_picture_over_pixel_by_pixel() {
-        let mut session = white_session();
-        session.apply(Command::View(ViewChoice::Camera(3)));
-        session.apply(Command::Scene(0.0));
-        assert_eq!(brightness(&mut session), 255.0);
-        assert_eq!(session.engine.tracer().tracer.view, ViewChoice::Camera(0));
-        assert_eq!(session.picture(Vec::new()).status.scene_secs, 0.0);
-        // 1,200 pixels at 100,000 samples/s take 12 ms.
-        run(&mut session, 0.006);
-        let half = brightness(&mut session);
-        assert!((64.0..192.0).contains(&half), "half the pixels are new: {half}");
-        run(&mut session, 0.05);
-        assert_eq!(brightness(&mut session), 0.0);
+        for reconstruction in KINDS {
+            let mut session = white_session_with(reconstruction);
+            session.apply(Command::View(ViewChoice::Camera(3)));
+            session.apply(Command::Scene(0.0));
+            assert_eq!(brightness(&mut session), 255.0, "{reconstruction:?}");
+            assert_eq!(session.engine.tracer().tracer.view, ViewChoice::Camera(0));
+            assert_eq!(session.picture(Vec::new()).status.scene_secs, 0.0);
+            // 1,200 pixels at 100,000 samples/s take 12 ms.
+            run(&mut session, 0.006);
+            let half = brightness(&mut session);
+            assert!((64.0..192.0).contains(&half), "half the pixels are new: {half}");
+            run(&mut session, 0.05);
+            assert_eq!(brightness(&mut session), 0.0, "{reconstruction:?}");
+        }
     }
 
     #[test]
     fn exposure_changes_the_picture_without_a_sample() {
+        for reconstruction in KINDS {
+            let mut session = white_session_with(reconstruction);
+            let exposure_stops = -2.0;
+            session.apply(Command::Settings(Settings { exposure_stops, ..session.settings }));
+            // sRGB of 0.25 is 0.537.
+            assert_eq!(brightness(&mut session), 137.0, "{reconstruction:?}");
+        }
+    }
+
+    #[test]
+    fn another_reconstruction_begins_with_what_is_held() {
+        let mut session = white_session_with(ReconstructionKind::Hold);
+        session.engine.tracer_mut().tracer.striped = true;
+        run(&mut session, 0.1);
+        let held = session.picture(Vec::new());
+        for reconstruction in KINDS {
+            let other = Settings { reconstruction, ..session.settings };
+            session.apply(Command::Settings(other));
+            let shown = session.picture(Vec::new());
+            assert_eq!(shown.rgba, held.rgba, "{reconstruction:?}");
+            assert_eq!(shown.status.ages.unknown, 0, "{reconstruction:?}");
+            let later_secs = shown.status.ages.mean_secs - held.status.ages.mean_secs;
+            assert!(later_secs.abs() < 1e-3, "{reconstruction:?}: {later_secs} s older");
+        }
+    }
+
+    #[test]
+    fn what_has_been_learned_stays_when_temporal_is_traded_against_spatial() {
         let mut session = white_session();
-        let exposure_stops = -2.0;
-        session.apply(Command::Settings(Settings { exposure_stops, ..session.settings }));
-        // sRGB of 0.25 is 0.537.
-        assert_eq!(brightness(&mut session), 137.0);
+        let adaptive = Settings { sampler: SamplerKind::ADAPTIVE, ..session.settings };
+        session.apply(Command::Settings(adaptive));
+        run(&mut session, 0.05);
+        session.apply(Command::Scene(0.0));
+        run(&mut session, 0.05);
+        let learned = |session: &Session<Plain>| session.engine.rates().map(|r| r.of_pixel(0));
+        let before = learned(&session);
+        assert!(before > Some(0.0), "{before:?}");
+        let sampler = SamplerKind::Adaptive { temporal: 0.9 };
+        session.apply(Command::Settings(Settings { sampler, ..adaptive }));
+        assert_eq!(learned(&session), before);
     }
 
     #[test]
     fn encoding_what_is_new_is_encoding_all() {
-        let mut session = white_session();
+        let mut session = white_session_with(ReconstructionKind::Hold);
         for grey in [0.1, 0.7, 0.3] {
             session.apply(Command::Scene(grey));
             run(&mut session, 0.004);
@@ -235,7 +347,7 @@ mod tests {
 
     #[test]
     fn resizing_there_and_back_between_two_pictures_shows_what_is_there() {
-        let mut session = white_session();
+        let mut session = white_session_with(ReconstructionKind::Hold);
         session.engine.tracer_mut().tracer.striped = true;
         run(&mut session, 0.1);
         session.picture(Vec::new());
@@ -260,16 +372,16 @@ mod tests {
     #[test]
     fn every_overlay_has_a_legend_and_the_picture_comes_back() {
         let mut session = white_session();
-        let change = Settings { sampler: SamplerKind::CHANGE, ..session.settings };
+        let adaptive = Settings { sampler: SamplerKind::ADAPTIVE, ..session.settings };
         for overlay in Overlay::ALL.into_iter().filter(|&overlay| overlay != Overlay::None) {
-            session.apply(Command::Settings(Settings { overlay, ..change }));
+            session.apply(Command::Settings(Settings { overlay, ..adaptive }));
             session.picture(Vec::new());
             run(&mut session, 0.5);
             let drawn = session.picture(Vec::new()).status.overlay;
             assert!(matches!(drawn, Some(Drawn::HeatMap(_))), "{overlay:?}: {drawn:?}");
             assert_ne!(brightness(&mut session), 255.0, "{overlay:?}");
         }
-        session.apply(Command::Settings(change));
+        session.apply(Command::Settings(adaptive));
         assert_eq!(session.picture(Vec::new()).status.overlay, None);
         assert_eq!(brightness(&mut session), 255.0);
     }
@@ -277,10 +389,60 @@ mod tests {
     #[test]
     fn a_sampler_that_knows_nothing_shows_the_picture() {
         let mut session = white_session();
-        let unknown = Settings { overlay: Overlay::TileProbability, ..session.settings };
-        session.apply(Command::Settings(unknown));
-        assert_eq!(session.picture(Vec::new()).status.overlay, Some(Drawn::Unknown));
-        assert_eq!(brightness(&mut session), 255.0);
+        for overlay in [Overlay::TileProbability, Overlay::LearnedRate] {
+            session.apply(Command::Settings(Settings { overlay, ..session.settings }));
+            assert_eq!(session.picture(Vec::new()).status.overlay, Some(Drawn::Unknown));
+            assert_eq!(brightness(&mut session), 255.0);
+        }
+    }
+
+    #[test]
+    fn change_is_seen_whoever_chooses_the_pixels() {
+        for sampler in SamplerKind::ALL {
+            let mut session = white_session();
+            let overlay = Overlay::Change;
+            session.apply(Command::Settings(Settings { sampler, overlay, ..session.settings }));
+            run(&mut session, 0.05);
+            let calm = brightness(&mut session);
+            session.apply(Command::Scene(0.0));
+            run(&mut session, 0.01);
+            let changed = brightness(&mut session);
+            assert!(calm < 1.0 && changed > 20.0, "{sampler:?}: {calm}, then {changed}");
+            session.apply(Command::Size(Size::new(10, 10)));
+            assert!(brightness(&mut session) < 1.0, "nothing is known of these pixels");
+        }
+    }
+
+    #[test]
+    fn the_first_picture_waits_for_a_sketch_but_not_for_a_slow_renderer() {
+        for (samples_per_sec, wait_secs) in [(100_000.0, 0.0), (1.0, 0.5)] {
+            let (size, clock) = (Size::new(64, 64), Clock::simulated(samples_per_sec));
+            let settings = Settings::default();
+            let mut session = Session::new(size, clock, settings, 1, Plain::new(1.0));
+            assert!(!session.is_worth_showing());
+            run(&mut session, wait_secs + 0.01);
+            assert!(session.is_worth_showing(), "at {samples_per_sec} samples/s");
+        }
+    }
+
+    #[test]
+    fn holes_are_marked_until_they_are_traced() {
+        let overlay = Overlay::Holes;
+        let settings = Settings { overlay, ..Settings::default() };
+        let clock = Clock::simulated(100_000.0);
+        let mut session = Session::new(Size::new(40, 30), clock, settings, 1, Plain::new(1.0));
+        // Known pixels are grey: a third of white.
+        let yellow = |session: &mut Session<Plain>| {
+            let picture = session.picture(Vec::new());
+            let marked = picture.rgba.iter().filter(|[_, _, blue, _]| *blue == 40).count();
+            assert_eq!(marked, picture.status.ages.unknown);
+            marked
+        };
+        assert_eq!(yellow(&mut session), 1200);
+        run(&mut session, 0.005);
+        assert!((600..1200).contains(&yellow(&mut session)));
+        run(&mut session, 0.1);
+        assert_eq!(yellow(&mut session), 0);
     }
 
     #[test]
@@ -290,7 +452,7 @@ mod tests {
         run(&mut session, 1.0);
         let status = session.picture(Vec::new()).status;
         assert!((status.samples_per_sec / 100_000.0 - 1.0).abs() < 0.02, "{status:?}");
-        assert_eq!(status.ages.untraced, 0);
+        assert_eq!(status.ages.unknown, 0);
         // A permutation visits each of 1,200 pixels every 12 ms, at most twice that from one pass to the next.
         assert!((0.004..0.008).contains(&status.ages.mean_secs), "{status:?}");
         assert!((0.008..0.026).contains(&status.ages.max_secs), "{status:?}");

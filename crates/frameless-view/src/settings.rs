@@ -1,12 +1,14 @@
 //! What the user can set, apart from the camera and the time.
 
-use frameless::{SamplerKind, Size};
+use frameless::{ReconstructionKind, SamplerKind, Size};
 
 /// Everything that may be set while the picture runs. No change of it clears the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Who chooses the pixels, with its parameters.
     pub sampler: SamplerKind,
+    /// How the picture is made of the samples.
+    pub reconstruction: ReconstructionKind,
     /// At most this many samples per second; `None`: as many as the renderer can.
     pub samples_per_sec: Option<f64>,
     /// Radiance is multiplied by 2^`exposure_stops` before display.
@@ -20,7 +22,8 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Settings {
-            sampler: SamplerKind::CHANGE,
+            sampler: SamplerKind::default(),
+            reconstruction: ReconstructionKind::default(),
             samples_per_sec: None,
             exposure_stops: 0.0,
             overlay: Overlay::None,
@@ -29,7 +32,7 @@ impl Default for Settings {
     }
 }
 
-/// What is shown instead of the picture, as a heat map.
+/// What is shown instead of the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Overlay {
     /// The picture.
@@ -37,32 +40,66 @@ pub enum Overlay {
     None,
     /// Change d when the pixel was traced last.
     Change,
-    /// Seconds since the pixel was traced last.
-    Age,
+    /// Seconds since what the pixel shows was traced, there or where it has moved from.
+    SourceAge,
     /// Probability that the next draw falls into the pixel's tile.
     TileProbability,
     /// Samples per second.
     SamplingRate,
+    /// v, how fast the sampler has found the pixel's tile to change.
+    LearnedRate,
+    /// Pixels of which nothing is known, and those that wait to be traced, over the darkened picture.
+    Holes,
 }
 
 impl Overlay {
-    /// All of them, in the order of the keys 0 to 4.
-    pub const ALL: [Overlay; 5] = [
+    /// All of them, in the order of the keys 0 to 6.
+    pub const ALL: [Overlay; 7] = [
         Overlay::None,
         Overlay::Change,
-        Overlay::Age,
+        Overlay::SourceAge,
         Overlay::TileProbability,
         Overlay::SamplingRate,
+        Overlay::LearnedRate,
+        Overlay::Holes,
     ];
 
     /// As in the panel.
     pub fn name(self) -> &'static str {
         match self {
-            Overlay::None => "none",
+            Overlay::None => "the picture",
             Overlay::Change => "change",
-            Overlay::Age => "age",
+            Overlay::SourceAge => "source age",
             Overlay::TileProbability => "tile probability",
             Overlay::SamplingRate => "sampling rate",
+            Overlay::LearnedRate => "learned rate",
+            Overlay::Holes => "holes",
+        }
+    }
+
+    /// What it teaches, in a sentence or two.
+    pub(crate) fn explanation(self) -> &'static str {
+        match self {
+            Overlay::None => "what the samples look like together",
+            Overlay::Change => {
+                "how far each pixel's last sample was from what the picture showed there: what the sampler is told"
+            }
+            Overlay::SourceAge => {
+                "how long ago the sample was traced that a pixel shows. With reproject it may have been traced \
+                 elsewhere, and have come here with its surface"
+            }
+            Overlay::TileProbability => {
+                "where the sampler's next draw falls. Samplers adaptive and change have it"
+            }
+            Overlay::SamplingRate => "how often each pixel is traced",
+            Overlay::LearnedRate => {
+                "v, the squared error that a second of age brings, learned for every tile; the more, the more \
+                 samples go there. Sampler adaptive has it"
+            }
+            Overlay::Holes => {
+                "pixels of which nothing is known: never traced, or just uncovered by something that moved away. \
+                 Sampler adaptive traces them first"
+            }
         }
     }
 }

@@ -1,42 +1,49 @@
-//! The canvas as the display wants it: 8 bits per channel, encoded once per sample and not once per refresh.
+//! The held canvas as the display wants it: 8 bits per channel, encoded once per sample and not once per refresh.
 
-use frameless::{Canvas, Display, Size, Time};
+use frameless::{Canvas, Display, Time};
 
 /// The encoded picture, and which sample each of its pixels shows.
 pub(crate) struct Shown {
-    size: Size,
-    display: Display,
+    of: Of,
     rgba: Vec<[u8; 4]>,
     times: Vec<Time>,
+}
+
+/// What has to be the same for a pixel with the same time to show the same: how often the canvas has been resized, how
+/// often its pixels were given another time without a sample, and the display.
+type Of = (u32, u64, Display);
+
+fn of(canvas: &Canvas, display: Display) -> Of {
+    (canvas.generation(), canvas.updates(), display)
 }
 
 /// How old the picture is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Ages {
-    /// Mean over the pixels that have been traced, in seconds.
+    /// Mean over the pixels that show a sample, in seconds.
     pub(crate) mean_secs: f64,
     /// The oldest of them, in seconds.
     pub(crate) max_secs: f64,
-    /// Pixels that have never been traced.
-    pub(crate) untraced: usize,
+    /// Pixels of which nothing is known, see [`Canvas::known`].
+    pub(crate) unknown: usize,
 }
 
 impl Shown {
     /// Encodes all of the canvas.
     pub(crate) fn new(canvas: &Canvas, display: Display) -> Shown {
         Shown {
-            size: canvas.size(),
-            display,
+            of: of(canvas, display),
             rgba: canvas.rgb().iter().map(|&rgb| display.encode_rgba8(rgb)).collect(),
             times: canvas.time().to_vec(),
         }
     }
 
-    /// Encodes what is new: the pixels with another time than last time, or all after a change of size or display.
+    /// Encodes what is new: the pixels with another time than last time, or all after a change of size or display, or
+    /// of the picture under another reconstruction.
     ///
     /// A pixel's time can also fall behind the last call's: samples are as old as their batch.
     pub(crate) fn update(&mut self, canvas: &Canvas, display: Display) {
-        if (self.size, self.display) != (canvas.size(), display) {
+        if self.of != of(canvas, display) {
             *self = Shown::new(canvas, display);
             return;
         }
@@ -47,11 +54,6 @@ impl Shown {
                 *rgba = display.encode_rgba8(rgb);
             }
         }
-    }
-
-    /// Everything must be encoded again: pixels changed without a new sample (there and back to another size).
-    pub(crate) fn forget(&mut self) {
-        self.times.fill(Time(u64::MAX));
     }
 
     /// sRGB-encoded RGBA, row-major.
@@ -78,6 +80,6 @@ pub(crate) fn ages(canvas: &Canvas, now: Time) -> Ages {
     Ages {
         mean_secs: if traced > 0 { sum_secs / traced as f64 } else { 0.0 },
         max_secs: now.secs_since(oldest),
-        untraced: canvas.time().len() - traced,
+        unknown: canvas.known().iter().filter(|&&known| !known).count(),
     }
 }

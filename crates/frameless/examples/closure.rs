@@ -1,7 +1,9 @@
 //! A renderer of one's own in a few lines: here a disc that circles over stripes.
 //! Run with `cargo run -p frameless --example closure`; it writes closure.ppm.
 
-use frameless::{Batch, Clock, Engine, Function, SamplerKind, Size, Time, hold};
+use frameless::{
+    Batch, Clock, Display, Engine, Function, ReconstructionKind, SamplerKind, Size, Time,
+};
 
 /// Linear RGB of image position (x, y), each in [0, 1], at a time in seconds.
 fn disc_over_stripes(x: f32, y: f32, secs: f32) -> [f32; 3] {
@@ -22,11 +24,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         batch.requests.iter().map(pixel).collect()
     });
     let clock = Clock::simulated(900_000.0);
-    let mut engine = Engine::new(size, clock, SamplerKind::CHANGE.build(1), renderer);
-    engine.run_until(Time::from_secs(2.0))?;
+    let mut engine = Engine::new(size, clock, SamplerKind::default().build(1), renderer);
+    // Of a renderer that does not say which surface it hit, `filter` makes the best of it.
+    engine.set_reconstruction(ReconstructionKind::Filter.build());
+    let end = Time::from_secs(2.0);
+    engine.run_until(end)?;
 
     let mut ppm = format!("P6 {} {} 255\n", size.width, size.height).into_bytes();
-    ppm.extend(hold(engine.canvas(), engine.display()).iter().flat_map(|&[r, g, b, _]| [r, g, b]));
+    ppm.extend(engine.refresh(end).iter().flatten().map(|&channel| Display::quantize(channel)));
     std::fs::write("closure.ppm", ppm)?;
     Ok(())
 }

@@ -178,12 +178,13 @@ impl Canvas {
 /// All pixels in an order that covers the picture evenly at every moment: bit-reversed blocks of 32×32, interleaved (Bayer
 /// 1973).
 fn coarse_to_fine(size: Size) -> Vec<u32> {
-    let mut pixels: Vec<u32> = (0..size.pixels() as u32).collect();
-    let rank = |&pixel: &u32| {
-        let (x, y) = size.xy(pixel);
-        crate::bayer::rank(x, y, 5)
-    };
-    pixels.sort_by_cached_key(rank);
+    const BITS: u32 = 5;
+    let mut pixels = Vec::with_capacity(size.pixels());
+    for (x0, y0) in crate::bayer::order(BITS) {
+        for y in (y0..size.height).step_by(1 << BITS) {
+            pixels.extend((x0..size.width).step_by(1 << BITS).map(|x| size.index(x, y)));
+        }
+    }
     pixels
 }
 
@@ -217,5 +218,18 @@ mod tests {
         let mut canvas = numbered(2, 1);
         assert_eq!(canvas.replace(1, Time(5), [9.0; 3]), (Time::ZERO, [1.0; 3]));
         assert_eq!(canvas.replace(1, Time(6), [0.0; 3]), (Time(5), [9.0; 3]));
+    }
+
+    #[test]
+    fn an_untraced_picture_is_one_hole_of_all_pixels_from_coarse_to_fine() {
+        for size in [Size::new(1, 1), Size::new(70, 50), Size::new(32, 64)] {
+            let canvas = Canvas::new(size);
+            let mut sorted: Vec<u32> = (0..size.pixels() as u32).collect();
+            sorted.sort_by_key(|&pixel| {
+                let (x, y) = size.xy(pixel);
+                crate::bayer::rank(x, y, 5)
+            });
+            assert_eq!(canvas.holes(), sorted);
+        }
     }
 }

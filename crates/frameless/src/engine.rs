@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use crate::{
     Answer, Batch, Canvas, Clock, Display, Findings, Hold, Kept, Lighting, Observation, Pose,
-    Reconstruction, Refresh, Request, Sampler, Size, Surface, Time, Timeline, Tracer,
+    Rates, Reconstruction, Refresh, Request, Sampler, Size, Surface, Time, Timeline, Tracer,
 };
 
 /// Everything that runs a frameless picture: a clock, a sampler, a renderer, and the canvas between them.
@@ -148,6 +148,7 @@ impl<T: Tracer> Engine<T> {
     /// If the renderer's answer cannot be used. Its good samples before the bad one are kept, and the loop can
     /// go on.
     pub fn step(&mut self) -> Result<usize, EngineError> {
+        self.observations.clear();
         match &mut self.clock {
             Clock::Simulated(clock) => {
                 let (now, count) = clock.next_batch();
@@ -302,7 +303,7 @@ impl<T: Tracer> Engine<T> {
         let lighting =
             self.reconstruction.wants_lighting() && self.tracer.lighting(secs, &mut self.lighting);
         let lighting = lighting.then_some(&self.lighting);
-        let rates = self.sampler.rates();
+        let rates = self.sampler.rates().filter(|rates| rates.size() == size);
         let (display, is_noisy) = (&self.display, self.tracer.is_noisy());
         let refresh = Refresh { now, pose, lighting, display, is_noisy, rates };
         self.reconstruction.refresh(&refresh, &mut self.canvas, &mut self.picture);
@@ -319,9 +320,36 @@ impl<T: Tracer> Engine<T> {
         Ok(())
     }
 
-    /// Make pictures in another way from now on. What the canvas holds stays; surfaces are learned anew.
+    /// Make pictures in another way from now on. What the canvas holds stays in its place; surfaces are learned anew. Also
+    /// for a renderer that has been given another scene: surfaces of the one before mean nothing in it.
     pub fn set_reconstruction(&mut self, reconstruction: Box<dyn Reconstruction>) {
         self.reconstruction = reconstruction;
+        self.hand_over_canvas();
+    }
+
+    /// Gives the reconstruction what the canvas holds, as samples without surfaces, with their times.
+    fn hand_over_canvas(&mut self) {
+        let canvas = &self.canvas;
+        let held = canvas.time().iter().zip(canvas.known()).zip(0u32..);
+        let held = held.filter(|((_, known), _)| **known).map(|((&time, _), pixel)| (time, pixel));
+        let mut held: Vec<(Time, u32)> = held.collect();
+        held.sort_unstable();
+        for batch in held.chunk_by(|(a, _), (b, _)| a == b) {
+            let requests: Vec<Request> = batch.iter().map(|&(_, i)| Request::centre(i)).collect();
+            let rgb: Vec<[f32; 3]> = batch.iter().map(|&(_, i)| canvas.rgb()[i as usize]).collect();
+            let (now, size) = (batch[0].0, canvas.size());
+            let kept = Kept {
+                now,
+                size,
+                requests: &requests,
+                new: &rgb,
+                old: &rgb,
+                surfaces: &[],
+                is_noisy: false,
+            };
+            self.findings.changes.clear();
+            self.reconstruction.keep(&kept, &self.display, &mut self.findings);
+        }
     }
 
     /// The present time of the engine's clock.
@@ -347,6 +375,17 @@ impl<T: Tracer> Engine<T> {
     /// Let somebody else choose the pixels; the picture stays.
     pub fn set_sampler(&mut self, sampler: Box<dyn Sampler>) {
         self.sampler = sampler;
+    }
+
+    /// What has been learned of how fast each part of the picture changes; `None` if the sampler learns no such thing, or
+    /// has not begun since the last change of size.
+    pub fn rates(&self) -> Option<&Rates> {
+        self.sampler.rates().filter(|rates| rates.size() == self.canvas.size())
+    }
+
+    /// What the sampler was told of the newest answer; empty if none has come in the last turn of the loop.
+    pub fn observations(&self) -> &[Observation] {
+        &self.observations
     }
 
     /// Trade temporal against spatial accuracy, see [`Sampler::set_temporal`].
@@ -398,6 +437,8 @@ impl<T: Tracer> Engine<T> {
     pub fn resize(&mut self, size: Size) {
         if size != self.canvas.size() {
             self.canvas = self.canvas.resized(size);
+            self.observations.clear();
+            self.hand_over_canvas();
         }
     }
 }

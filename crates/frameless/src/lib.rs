@@ -2,22 +2,26 @@
 //!
 //! The actors: a [`Tracer`] is a renderer; a [`Sampler`] chooses which pixels it traces next; the [`Canvas`] keeps the
 //! newest sample of every pixel; the [`Engine`] is the loop between them, on a [`Clock`] that is real or simulated.
-//! A reconstruction ([`hold`]) makes a picture of the canvas at any time.
+//! A [`Reconstruction`] makes a picture of the samples at any time. The defaults of [`SamplerKind`] and
+//! [`ReconstructionKind`] are the best that there is; [`Engine::new`] begins with [`Hold`], which asks nothing of a renderer.
 //!
 //! ```
-//! use frameless::{Batch, Clock, Engine, Function, SamplerKind, Size, Time};
+//! use frameless::{
+//!     Batch, Clock, Engine, Function, ReconstructionKind, SamplerKind, Size, Time,
+//! };
 //!
 //! // A renderer: any function from pixels and a time to linear RGB.
 //! let render = |batch: &Batch| -> Vec<[f32; 3]> {
 //!     let brightness = (batch.scene_secs as f32).sin().abs();
 //!     batch.requests.iter().map(|_| [brightness; 3]).collect()
 //! };
-//! let sampler = SamplerKind::CHANGE.build(1);
+//! let sampler = SamplerKind::default().build(1);
 //! let mut engine =
 //!     Engine::new(Size::new(64, 48), Clock::simulated(100_000.0), sampler, Function::new(render));
+//! engine.set_reconstruction(ReconstructionKind::default().build());
 //! engine.run_until(Time::from_secs(0.5))?;
-//! let rgba8: Vec<[u8; 4]> = frameless::hold(engine.canvas(), engine.display());
-//! assert_eq!(rgba8.len(), 64 * 48);
+//! let srgb: &[[f32; 3]] = engine.refresh(Time::from_secs(0.5));
+//! assert_eq!(srgb.len(), 64 * 48);
 //! # Ok::<(), frameless::EngineError>(())
 //! ```
 

@@ -1,7 +1,7 @@
 //! The learned rate of change of every tile.
 
-use crate::Observation;
 use crate::tile::TileGrid;
+use crate::{Observation, Size};
 
 /// How fast the picture becomes wrong, tile by tile:
 ///
@@ -66,6 +66,11 @@ impl Rates {
         self.mean_age_secs[tile]
     }
 
+    /// Of the picture whose tiles these are.
+    pub fn size(&self) -> Size {
+        self.grid.size
+    }
+
     /// v where a pixel is: squared error per channel and second.
     pub fn of_pixel(&self, pixel: u32) -> f32 {
         self.rate[self.grid.tile_of(pixel)]
@@ -75,7 +80,7 @@ impl Rates {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Size, Time};
+    use crate::Time;
 
     #[test]
     fn a_steady_change_is_learned_and_forgotten() {

@@ -20,6 +20,10 @@ fn unknown_and_missing_arguments() {
     frameless(&["render", "sphere"]).refused(2, "--out <FILE>");
     frameless(&["info"]).refused(2, "<SCENE>");
     frameless(&["view", "--sampler", "best"]).refused(2, "random, permutation, change");
+    frameless(&["view", "--reconstruction", "blur"]).refused(2, "hold, filter or reproject");
+    frameless(&["view", "--temporal", "2"]).refused(2, "0 to 1");
+    let blind = ["view", "--sampler", "random", "--temporal", "0.5"];
+    frameless(&blind).refused(2, "sampler adaptive");
     frameless(&["view", "--size", "0x10"]).refused(2, "--size");
     frameless(&["view", "--rate", "-5"]).refused(2, "-5");
     frameless(&["render", "sphere", "--time", "inf", "-o", "x.png"]).refused(2, "finite");

@@ -83,7 +83,7 @@ fn default_max_factor() -> f64 {
     64.0
 }
 fn default_algorithms() -> Vec<String> {
-    ["random", "permutation", "change"].map(String::from).to_vec()
+    ["random", "change", "adaptive+reproject"].map(String::from).to_vec()
 }
 fn default_seeds() -> Vec<u64> {
     vec![1]

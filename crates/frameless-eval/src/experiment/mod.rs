@@ -2,7 +2,7 @@
 //!
 //! ```toml
 //! title = "The sketch's figures"
-//! algorithms = ["random", "permutation", "change"]   # default: these three
+//! algorithms = ["random", "change", "adaptive+reproject"]   # default: these three
 //! samples_per_sec = [900_000]
 //! seeds = [1]                                         # default
 //! width = 512                                         # default

@@ -97,6 +97,17 @@ pub struct ReprojectOptions {
     pub antialias: bool,
 }
 
+/// `reproject+relight+antialias`: the best that there is, wherever the renderer tells of surfaces.
+impl Default for ReconstructionKind {
+    fn default() -> ReconstructionKind {
+        ReconstructionKind::Reproject(ReprojectOptions {
+            relight: true,
+            deep: false,
+            antialias: true,
+        })
+    }
+}
+
 impl ReconstructionKind {
     /// [`Reproject`] without options.
     pub const REPROJECT: ReconstructionKind = ReconstructionKind::Reproject(ReprojectOptions {

@@ -34,6 +34,13 @@ pub enum SamplerKind {
     },
 }
 
+/// [`SamplerKind::ADAPTIVE`].
+impl Default for SamplerKind {
+    fn default() -> SamplerKind {
+        SamplerKind::ADAPTIVE
+    }
+}
+
 impl SamplerKind {
     /// `change` with the measured defaults.
     pub const CHANGE: SamplerKind = SamplerKind::Change { w_d: DEFAULT_W_D, tile: DEFAULT_TILE };

@@ -38,6 +38,7 @@ pub struct Reproject {
     /// The picture of the last refresh, and what is needed to find a surface in it.
     shown: Vec<[f32; 3]>,
     shown_at: Time,
+    display: Display,
     /// Where everything was at the last refresh, and at the one before.
     poses: [Pose; 2],
     /// Seconds between these two.
@@ -62,6 +63,7 @@ impl Reproject {
             settled: Default::default(),
             shown: Vec::new(),
             shown_at: Time::ZERO,
+            display: Display::default(),
             poses: Default::default(),
             interval_secs: 0.0,
             refreshes: 0,
@@ -77,6 +79,7 @@ impl Reproject {
             self.refreshes = 0;
             self.shown.clear();
             self.settled.fit(size);
+            self.no_rates = None;
         }
     }
 
@@ -154,8 +157,13 @@ impl Reconstruction for Reproject {
         if !at_rest {
             self.warp.run(&mut self.store, &self.poses[0]);
         }
+        let display = *refresh.display;
+        if std::mem::replace(&mut self.display, display) != display {
+            let (store, relight) = (&mut self.store, &self.relight);
+            store.encode_again(&display, |store, cell| relight.linear(store, cell));
+        }
         if let Some(lighting) = refresh.lighting {
-            self.relight.run(&mut self.store, lighting, refresh.display);
+            self.relight.run(&mut self.store, lighting, &display);
         }
         let rates = refresh.rates.unwrap_or_else(|| {
             self.no_rates.get_or_insert_with(|| Rates::new(TileGrid::new(size, 8)))

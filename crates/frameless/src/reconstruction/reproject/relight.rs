@@ -13,7 +13,6 @@ use crate::{Display, Lighting, Surface};
 #[derive(Default)]
 pub(super) struct Relight {
     shown: Lighting,
-    display: Display,
     /// Objects that look different under the new lights, or stand differently in them.
     changed: Vec<bool>,
 }
@@ -58,7 +57,7 @@ impl Relight {
         lighting: &Lighting,
         display: &Display,
     ) -> bool {
-        let everything = lighting.lights != self.shown.lights || *display != self.display;
+        let everything = lighting.lights != self.shown.lights;
         let then = &self.shown.world_from_object;
         let placements = lighting.world_from_object.iter().enumerate();
         self.changed.clear();
@@ -68,13 +67,12 @@ impl Relight {
         let any = self.changed.contains(&true);
         if any {
             self.shown.clone_from(lighting);
-            self.display = *display;
-            self.shade(store);
+            self.shade(store, display);
         }
         any
     }
 
-    fn shade(&self, store: &mut Store) {
+    fn shade(&self, store: &mut Store, display: &Display) {
         for i in 0..store.layout.len() {
             let object = store.object[i];
             if object == EMPTY || !self.has_changed(object) {
@@ -82,7 +80,7 @@ impl Relight {
             }
             let surface = surface(object, &store.anchor[i]);
             if let Some(rgb) = store.shade[i].relit(&surface, &self.shown) {
-                let rgb = self.display.encode(rgb);
+                let rgb = display.encode(rgb);
                 (0..3).for_each(|k| store.rgb[k][i] = rgb[k]);
             }
         }

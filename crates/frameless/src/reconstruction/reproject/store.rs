@@ -234,6 +234,21 @@ impl Store {
         self.shade[i] = sample.shade;
     }
 
+    /// All samples for another display, from their `linear` colours.
+    pub(super) fn encode_again(
+        &mut self,
+        display: &Display,
+        linear: impl Fn(&Store, usize) -> [f32; 3],
+    ) {
+        for i in 0..self.layout.len() {
+            if self.is_empty(i) {
+                continue;
+            }
+            let rgb = display.encode(linear(self, i));
+            (0..3).for_each(|k| self.rgb[k][i] = rgb[k]);
+        }
+    }
+
     /// Gives the sample in a cell another linear colour.
     pub(super) fn recolour(&mut self, i: usize, rgb: [f32; 3], display: &Display) {
         self.shade[i] = Shade { rgb, ..self.shade[i] };
