@@ -283,3 +283,16 @@ pub(crate) fn gather<T: Copy>(into: &mut [T], from: &[T], index: &[u32]) {
         *into = unsafe { *from.get_unchecked(i as usize) };
     }
 }
+
+/// Begin to fetch `plane[i]` from memory, if there is such; it will be read soon.
+#[inline(always)]
+pub(crate) fn prefetch<T>(plane: &[T], i: usize) {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(place) = plane.get(i) {
+        use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: every x86-64 processor has SSE, and prefetching changes nothing.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(place).cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (plane, i);
+}
