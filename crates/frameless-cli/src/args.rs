@@ -336,4 +336,6 @@ pub(crate) enum Benchmark {
     Engine,
     /// The samplers alone: nanoseconds per sample beside the renderer
     Sampler,
+    /// The picture alone: nanoseconds per pixel of a refresh
+    Display,
 }

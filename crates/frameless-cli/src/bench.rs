@@ -1,5 +1,6 @@
 //! `frameless bench`: speeds as ratios against something measured in the same run.
 
+mod display;
 mod engine;
 mod sampler;
 mod table;
@@ -12,7 +13,8 @@ use crate::output;
 pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
     let rows = match args.what {
         Benchmark::Engine => engine::measure(args)?,
-        Benchmark::Sampler => sampler::measure(args),
+        Benchmark::Sampler => sampler::measure(args)?,
+        Benchmark::Display => display::measure(args)?,
     };
     let text = if args.json { table::json(&rows) } else { table::plain(&rows) };
     Ok(output::print(&text)?)

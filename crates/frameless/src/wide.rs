@@ -55,8 +55,8 @@ impl F8 {
     }
 
     #[inline(always)]
-    pub(crate) fn new(lanes: [f32; 8]) -> F8 {
-        F8::load(&lanes, 0)
+    pub(crate) fn new([a, b, c, d, e, f, g, h]: [f32; 8]) -> F8 {
+        F8([F4::new([a, b, c, d]), F4::new([e, f, g, h])])
     }
 
     #[inline(always)]
@@ -232,6 +232,43 @@ fn halves<T>(eight: &[T]) -> [&[T; 4]; 2] {
     [&halves[0], &halves[1]]
 }
 
+/// Planes of equal length, of which eight numbers at a time are read from the same place: one check for all.
+#[derive(Clone, Copy)]
+pub(crate) struct Planes<'a, T, const N: usize> {
+    planes: [&'a [T]; N],
+    len: usize,
+}
+
+impl<'a, T, const N: usize> Planes<'a, T, N> {
+    pub(crate) fn new(planes: [&'a [T]; N]) -> Planes<'a, T, N> {
+        let len = planes.iter().map(|plane| plane.len()).min().unwrap_or(0);
+        Planes { planes, len }
+    }
+
+    #[inline(always)]
+    fn eights(&self, start: usize) -> [&'a [T]; N] {
+        assert!(start < self.len && self.len - start >= 8);
+        // SAFETY: no plane is shorter than `len`, and eight numbers from `start` on are within it.
+        self.planes.map(|plane| unsafe { plane.get_unchecked(start..start + 8) })
+    }
+}
+
+impl<const N: usize> Planes<'_, f32, N> {
+    /// The eight from `start` on, of every plane.
+    #[inline(always)]
+    pub(crate) fn load(&self, start: usize) -> [F8; N] {
+        self.eights(start).map(|eight| F8::load(eight, 0))
+    }
+}
+
+impl<const N: usize> Planes<'_, u32, N> {
+    /// The eight from `start` on, of every plane.
+    #[inline(always)]
+    pub(crate) fn load(&self, start: usize) -> [M8; N] {
+        self.eights(start).map(|eight| M8::load(eight, 0))
+    }
+}
+
 /// `into[k] = from[index[k]]`.
 ///
 /// # Panics
@@ -245,4 +282,17 @@ pub(crate) fn gather<T: Copy>(into: &mut [T], from: &[T], index: &[u32]) {
         // SAFETY: no index is larger than `largest`, which has just been found to be in `from`.
         *into = unsafe { *from.get_unchecked(i as usize) };
     }
+}
+
+/// Begin to fetch `plane[i]` from memory, if there is such; it will be read soon.
+#[inline(always)]
+pub(crate) fn prefetch<T>(plane: &[T], i: usize) {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(place) = plane.get(i) {
+        use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: every x86-64 processor has SSE, and prefetching changes nothing.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(place).cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (plane, i);
 }

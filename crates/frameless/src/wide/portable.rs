@@ -17,6 +17,11 @@ impl F4 {
     }
 
     #[inline(always)]
+    pub(super) fn new(lanes: [f32; 4]) -> F4 {
+        F4(lanes)
+    }
+
+    #[inline(always)]
     pub(super) fn load(lanes: &[f32; 4]) -> F4 {
         F4(*lanes)
     }

@@ -16,6 +16,11 @@ impl F4 {
     }
 
     #[inline(always)]
+    pub(super) fn new([a, b, c, d]: [f32; 4]) -> F4 {
+        unsafe { F4(_mm_setr_ps(a, b, c, d)) }
+    }
+
+    #[inline(always)]
     pub(super) fn load(lanes: &[f32; 4]) -> F4 {
         F4(unsafe { _mm_loadu_ps(lanes.as_ptr()) })
     }

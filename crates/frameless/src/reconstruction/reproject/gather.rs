@@ -13,7 +13,7 @@ use super::fill::{self, AROUND};
 use super::holes::{Hole, Waiting};
 use super::store::{CENTRAL_PX, EMPTY, Layout, Store, TICK_SECS, Tick};
 use crate::rates::Rates;
-use crate::wide::{self, F8, M8};
+use crate::wide::{self, F8, M8, Planes};
 use crate::{Size, Time};
 
 /// What became of the pixels.
@@ -52,7 +52,15 @@ impl Gather {
         self.source.resize(pixels, fill::NOBODY);
         self.far.clear();
         self.waiting.clear();
-        let model = Model { store, now: Tick::of(now), rates, contrast };
+        let [red, green, blue] = store.rgb.each_ref().map(Vec::as_slice);
+        let model = Model {
+            samples: Planes::new([&store.px[0], &store.px[1], red, green, blue]),
+            marks: Planes::new([&store.object, &store.tick]),
+            store,
+            now: Tick::of(now),
+            rates,
+            contrast,
+        };
         let cells = Cells::new(&store.layout);
         wide::run(Blocks { model, cells: &cells, now, picture, gather: self });
         self.fill_far(store.layout.size, shown, picture);
@@ -95,8 +103,9 @@ impl<F: Fn(u32) -> bool> wide::Task for OffCentre<'_, F> {
                 for sub in 0..(per_side * per_side) as usize {
                     let i = first + sub * plane;
                     let is_sample = M8::load(&store.object, i).equals(M8::splat(EMPTY)).not();
+                    let px = [F8::load(&store.px[0], i), F8::load(&store.px[1], i)];
                     let is_near =
-                        distance2(store, i, &centre).less_than(F8::splat(CENTRAL_PX * CENTRAL_PX));
+                        distance2(px, &centre).less_than(F8::splat(CENTRAL_PX * CENTRAL_PX));
                     known = known.either(is_sample);
                     central = central.either(is_sample.and(is_near));
                 }
@@ -119,11 +128,9 @@ fn centres(x: u32, y: u32) -> [F8; 2] {
     [columns.to_f32() + F8::splat(0.5), F8::splat(y as f32 + 0.5)]
 }
 
-/// From eight samples to the eight centres.
 #[inline(always)]
-fn distance2(store: &Store, i: usize, centre: &[F8; 2]) -> F8 {
-    let dx = F8::load(&store.px[0], i) - centre[0];
-    let dy = F8::load(&store.px[1], i) - centre[1];
+fn distance2(px: [F8; 2], centre: &[F8; 2]) -> F8 {
+    let (dx, dy) = (px[0] - centre[0], px[1] - centre[1]);
     dx * dx + dy * dy
 }
 
@@ -157,6 +164,10 @@ impl Cells {
 /// The expected error of samples.
 #[derive(Clone, Copy)]
 struct Model<'a> {
+    /// Column, row, red, green, blue.
+    samples: Planes<'a, f32, 5>,
+    /// Object, tick.
+    marks: Planes<'a, u32, 2>,
     store: &'a Store,
     now: Tick,
     rates: &'a Rates,
@@ -231,12 +242,16 @@ impl Blocks<'_> {
         }
         let start = size.index(x, y) as usize;
         let (rgb, ticks, are_holes) = (seen.rgb.map(F8::lanes), seen.tick.lanes(), holes.bits());
+        let pixels = start..start + lanes;
+        let picture = &mut self.picture[pixels.clone()];
+        let known = &mut self.gather.known[pixels.clone()];
+        let time = &mut self.gather.time[pixels.clone()];
+        let source = &mut self.gather.source[pixels];
         for lane in 0..lanes {
-            let pixel = start + lane;
-            self.picture[pixel] = [rgb[0][lane], rgb[1][lane], rgb[2][lane]];
-            self.gather.known[pixel] = are_holes & (1 << lane) == 0;
-            self.gather.time[pixel] = Tick(ticks[lane]).time(self.now);
-            self.gather.source[pixel] = pixel as u32;
+            picture[lane] = [rgb[0][lane], rgb[1][lane], rgb[2][lane]];
+            known[lane] = are_holes & (1 << lane) == 0;
+            time[lane] = Tick(ticks[lane]).time(self.now);
+            source[lane] = (start + lane) as u32;
         }
         if holes.any() {
             self.note_holes(&eight, holes, x, y);
@@ -278,10 +293,9 @@ impl Blocks<'_> {
 
 impl Model<'_> {
     #[inline(always)]
-    fn errors(&self, i: usize, eight: &Eight) -> F8 {
-        let ticks = M8::splat(self.now.0).minus(M8::load(&self.store.tick, i));
-        let age_secs = ticks.to_f32() * F8::splat(TICK_SECS);
-        eight.v * age_secs + eight.s * distance2(self.store, i, &eight.centre)
+    fn errors(&self, px: [F8; 2], tick: M8, eight: &Eight) -> F8 {
+        let age_secs = M8::splat(self.now.0).minus(tick).to_f32() * F8::splat(TICK_SECS);
+        eight.v * age_secs + eight.s * distance2(px, &eight.centre)
     }
 
     /// The pixels' own samples with the least expected error.
@@ -295,18 +309,17 @@ impl Model<'_> {
         };
         for &offset in &cells.own {
             let i = eight.first.wrapping_add_signed(offset);
-            let (error, object) = (self.errors(i, eight), M8::load(&self.store.object, i));
+            let [x, y, rgb @ ..] = self.samples.load(i);
+            let [object, tick] = self.marks.load(i);
+            let error = self.errors([x, y], tick, eight);
             let is_sample = object.equals(M8::splat(EMPTY)).not();
-            let tick = M8::load(&self.store.tick, i);
             let is_first = seen.object.equals(M8::splat(EMPTY));
             let is_newer = M8::splat(0).less_than(tick.minus(seen.tick));
             seen.tick = tick.or(is_sample.and(is_first.either(is_newer)), seen.tick);
             let better = error.less_than(seen.error).and(is_sample);
             seen.error = error.or(better, seen.error);
             seen.object = object.or(better, seen.object);
-            for (rgb, plane) in seen.rgb.iter_mut().zip(&self.store.rgb) {
-                *rgb = F8::load(plane, i).or(better, *rgb);
-            }
+            seen.rgb = [0, 1, 2].map(|k| rgb[k].or(better, seen.rgb[k]));
         }
         seen
     }
@@ -318,9 +331,9 @@ impl Model<'_> {
         let mut nearest = M8::splat(EMPTY);
         for &(offset, _) in &cells.around {
             let i = eight.first.wrapping_add_signed(offset);
-            let object = M8::load(&self.store.object, i);
+            let ([x, y, ..], [object, _]) = (self.samples.load(i), self.marks.load(i));
             let is_sample = object.equals(M8::splat(EMPTY)).not();
-            let distance2 = distance2(self.store, i, &eight.centre);
+            let distance2 = distance2([x, y], &eight.centre);
             let nearer = distance2.less_than(least).and(is_sample);
             least = distance2.or(nearer, least);
             nearest = object.or(nearer, nearest);
@@ -336,14 +349,15 @@ impl Model<'_> {
         let (mut red, mut green, mut blue, mut weights) = (zero, zero, zero, zero);
         for &(offset, is_near) in &cells.around {
             let i = eight.first.wrapping_add_signed(offset);
-            let counts = M8::load(&self.store.object, i).equals(object);
-            let counts = counts.and(holes.either(M8::splat(is_near)));
-            let error = self.errors(i, eight) + floor;
+            let [x, y, r, g, b] = self.samples.load(i);
+            let [other, tick] = self.marks.load(i);
+            let counts = other.equals(object).and(holes.either(M8::splat(is_near)));
+            let error = self.errors([x, y], tick, eight) + floor;
             let weight = (F8::splat(1.0) / (error * error)).or(counts, zero);
             weights = weights + weight;
-            red = red + weight * F8::load(&self.store.rgb[0], i);
-            green = green + weight * F8::load(&self.store.rgb[1], i);
-            blue = blue + weight * F8::load(&self.store.rgb[2], i);
+            red = red + weight * r;
+            green = green + weight * g;
+            blue = blue + weight * b;
         }
         [red / weights, green / weights, blue / weights]
     }
@@ -353,7 +367,7 @@ impl Model<'_> {
     fn are_known(&self, first: usize, cells: &Cells) -> M8 {
         let mut known = M8::splat(0);
         for &offset in &cells.own {
-            let object = M8::load(&self.store.object, first.wrapping_add_signed(offset));
+            let [object, _] = self.marks.load(first.wrapping_add_signed(offset));
             known = known.either(object.equals(M8::splat(EMPTY)).not());
         }
         known

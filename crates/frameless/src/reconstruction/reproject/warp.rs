@@ -4,7 +4,7 @@
 //! the other moves to the neighbouring cell on its side, if that is empty; so it is with samples whose surface is not known. At last what is seen through the cracks between a nearer
 //! object's samples is taken away.
 
-use super::store::{Anchor, EMPTY, Layout, SCREEN, Sample, Store, surface};
+use super::store::{Anchor, EMPTY, Layout, SCREEN, Store, surface};
 use crate::wide::{self, F8, M8};
 use crate::{Pose, Surface};
 
@@ -21,6 +21,7 @@ pub(super) struct Warp {
     /// Per cell the old cell whose sample is here now.
     winner: Vec<u32>,
     losers: Vec<u32>,
+    moves: Vec<(u32, u32)>,
     covered: Vec<u32>,
 }
 
@@ -77,8 +78,8 @@ impl Warp {
     }
 
     fn step_aside(&mut self, store: &mut Store) {
-        let Some(old) = &self.next else { return };
-        wide::run(StepAside { old, carried: &self.carried, losers: &self.losers, store });
+        let Warp { next: Some(old), carried, losers, moves, .. } = self else { return };
+        wide::run(StepAside { old, carried, losers, moves, store });
     }
 
     fn remove_seen_through_cracks(&mut self, store: &mut Store) {
@@ -288,29 +289,43 @@ struct StepAside<'a> {
     old: &'a Store,
     carried: &'a Carried,
     losers: &'a [u32],
+    /// Who goes where.
+    moves: &'a mut Vec<(u32, u32)>,
     store: &'a mut Store,
 }
 
 impl wide::Task for StepAside<'_> {
     #[inline(always)]
     fn run(self) {
-        let StepAside { old, carried, losers, store } = self;
+        let StepAside { old, carried, losers, moves, store } = self;
+        moves.clear();
         let n = store.layout.per_side as f32;
         for &loser in losers {
-            let loser = loser as usize;
-            let px = [carried.px[0][loser], carried.px[1][loser]];
+            let i = loser as usize;
+            let px = [carried.px[0][i], carried.px[1][i]];
             let [fx, fy] = px.map(|p| (p * n).fract() - 0.5);
-            let beside = if fx.abs() > fy.abs() {
-                [px[0] + fx.signum() / n, px[1]]
-            } else {
-                [px[0], px[1] + fy.signum() / n]
-            };
-            if let Some(i) = store.layout.of_px(beside)
-                && store.is_empty(i)
+            let sideways = fx.abs() > fy.abs();
+            let dx = if sideways { fx.signum() / n } else { 0.0 };
+            let dy = if sideways { 0.0 } else { fy.signum() / n };
+            if let Some(cell) = store.layout.of_px([px[0] + dx, px[1] + dy])
+                && store.is_empty(cell)
             {
-                store.set(i, &Sample { px, depth: carried.depth[loser], ..old.get(loser) });
+                store.object[cell] = old.object[i];
+                moves.push((loser, cell as u32));
             }
         }
+        (0..3).for_each(|k| scatter(moves, &old.rgb[k], &mut store.rgb[k]));
+        (0..2).for_each(|k| scatter(moves, &carried.px[k], &mut store.px[k]));
+        scatter(moves, &carried.depth, &mut store.depth);
+        scatter(moves, &old.tick, &mut store.tick);
+        scatter(moves, &old.anchor, &mut store.anchor);
+    }
+}
+
+#[inline(always)]
+fn scatter<T: Copy>(moves: &[(u32, u32)], from: &[T], into: &mut [T]) {
+    for &(source, cell) in moves {
+        into[cell as usize] = from[source as usize];
     }
 }
 

@@ -10,7 +10,7 @@
 
 use crate::bayer;
 use crate::rates::Rates;
-use crate::{Canvas, Rng, Time};
+use crate::{Canvas, Rng, Time, wide};
 
 /// ε: the part of the samples that is spread evenly over the picture, so that every pixel has a floor frequency.
 const EVENLY: f32 = 0.2;
@@ -24,6 +24,8 @@ pub(crate) struct Credit {
     credit: Vec<f32>,
     place: Vec<u32>,
     weight: Vec<f32>,
+    /// Tiles that have a whole credit.
+    rich: Vec<u32>,
     /// Pixels of a tile in their order, relative to its corner.
     order: Vec<(u32, u32)>,
 }
@@ -41,6 +43,7 @@ impl Credit {
             credit: (0..tiles).map(|_| rng.unit_f32()).collect(),
             place: (0..tiles).map(|_| rng.next_u32()).collect(),
             weight: vec![0.0; tiles],
+            rich: Vec::new(),
             order: bayer::order(side_bits),
         }
     }
@@ -55,14 +58,28 @@ impl Credit {
         mut take: impl FnMut(u32),
     ) {
         let tiles = self.credit.len();
-        let mut sum = 0.0;
+        // Flat loops, one thing each: the compiler makes vectors of all but the sum.
         for (weight, rate) in self.weight.iter_mut().zip(rates.all()) {
             *weight = (rate + LEAST_RATE).sqrt();
-            sum += *weight;
         }
+        let sum: f32 = self.weight.iter().sum();
         let (per_weight, evenly) = ((1.0 - EVENLY) * count / sum, EVENLY * count / tiles as f32);
-        for tile in 0..tiles {
-            self.credit[tile] += per_weight * self.weight[tile] + evenly;
+        for (credit, weight) in self.credit.iter_mut().zip(&self.weight) {
+            *credit += per_weight * weight + evenly;
+        }
+        self.rich.clear();
+        let rich = (0..).zip(&self.credit).filter(|(_, credit)| **credit >= 1.0);
+        self.rich.extend(rich.map(|(tile, _)| tile));
+        // What is looked at lies all over the picture: fetched many at a time instead of one after the other.
+        for &tile in &self.rich {
+            let rect = rates.grid.rect(tile as usize);
+            let (dx, dy) = self.order[self.place[tile as usize] as usize & (self.order.len() - 1)];
+            let i = canvas.size().index(rect.x0 + dx, rect.y0 + dy) as usize;
+            wide::prefetch(canvas.known(), i);
+            wide::prefetch(canvas.time(), i);
+        }
+        for i in 0..self.rich.len() {
+            let tile = self.rich[i] as usize;
             while self.credit[tile] >= 1.0 {
                 self.credit[tile] -= 1.0;
                 take(self.pixel(now, canvas, rates, tile));
@@ -76,7 +93,8 @@ impl Credit {
         let enough_secs = 0.5 * rates.mean_age_secs(tile);
         let mut tries = 0;
         while tries < TRIES {
-            let (dx, dy) = self.order[self.place[tile] as usize % self.order.len()];
+            // As many as a power of two.
+            let (dx, dy) = self.order[self.place[tile] as usize & (self.order.len() - 1)];
             self.place[tile] = self.place[tile].wrapping_add(1);
             let (x, y) = (rect.x0 + dx, rect.y0 + dy);
             if x >= rect.x1 || y >= rect.y1 {
