@@ -1,4 +1,5 @@
-//! Holes in the order in which they are filled: large ones first, those off their centre last, evenly spread in every part of the order.
+//! Pixels that wait to be traced, in their order: large holes first, samples off their centre last, evenly spread in every part of the
+//! order.
 
 use crate::bayer;
 
@@ -9,6 +10,8 @@ pub(super) enum Hole {
     Large,
     /// It has no sample, but its neighbours know enough for a good guess.
     Small,
+    /// It lies at the edge of a shadow whose light has moved.
+    ShadowEdge,
     /// Its samples are not at its centre, and nothing moves that could have carried them there.
     OffCentre,
 }
@@ -16,7 +19,7 @@ pub(super) enum Hole {
 const BITS: u32 = 3;
 const RANKS: usize = 1 << (2 * BITS);
 /// Kinds of holes times places in Bayer's order.
-const CLASSES: usize = 3 * RANKS;
+const CLASSES: usize = 4 * RANKS;
 
 /// Pixels that wait to be traced.
 pub(super) struct Waiting {

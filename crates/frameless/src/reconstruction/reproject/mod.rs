@@ -126,7 +126,8 @@ impl Reconstruction for Reproject {
 
     fn aim(&self, now: Time, canvas: &Canvas, requests: &mut [Request]) {
         if self.refreshes >= 2 && self.store.layout.size == canvas.size() {
-            for request in requests {
+            // Those that add to a pixel's samples lie where they are to lie.
+            for request in requests.iter_mut().filter(|request| request.sample_index == 0) {
                 self.aim_one(now, request);
             }
         }
@@ -173,6 +174,7 @@ impl Reconstruction for Reproject {
         }
         tile_contrast(&self.shown, &rates.grid, &mut self.contrast);
         self.gather.run(&self.store, refresh.now, rates, &self.contrast, &self.shown, picture);
+        self.relight.find_shadow_edges(&self.store, &mut self.gather.waiting);
         if self.settled.any_rests() {
             self.gather.find_off_centre(&self.store, |object| self.settled.rests(object));
         }

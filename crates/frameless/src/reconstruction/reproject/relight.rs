@@ -6,13 +6,16 @@
 //!
 //! What the object emits and reflects, and ambient light, stay as they were until the pixel is traced again; so do shadows.
 
+use super::holes::{Hole, Waiting};
 use super::store::{EMPTY, Sample, Shade, Store, surface};
-use crate::{Display, Lighting, Surface};
+use crate::{Display, Light, Lighting, Surface};
 
 /// The lights under which the stored samples are shown.
 #[derive(Default)]
 pub(super) struct Relight {
     shown: Lighting,
+    /// Bit i: light i stood elsewhere at the refresh before.
+    moved: u32,
     /// Objects that look different under the new lights, or stand differently in them.
     changed: Vec<bool>,
 }
@@ -57,6 +60,7 @@ impl Relight {
         lighting: &Lighting,
         display: &Display,
     ) -> bool {
+        self.moved = moved(&lighting.lights, &self.shown.lights);
         let everything = lighting.lights != self.shown.lights;
         let then = &self.shown.world_from_object;
         let placements = lighting.world_from_object.iter().enumerate();
@@ -72,6 +76,28 @@ impl Relight {
         any
     }
 
+    /// Pixels at the edges of shadows whose lights have moved: there the shadow is somewhere else by now.
+    pub(super) fn find_shadow_edges(&self, store: &Store, waiting: &mut Waiting) {
+        if self.moved == 0 {
+            return;
+        }
+        let layout = store.layout;
+        let size = layout.size;
+        let differ = |a: usize, b: usize| {
+            store.object[a] == store.object[b]
+                && (store.shade[a].lit ^ store.shade[b].lit) & self.moved != 0
+        };
+        for y in 0..size.height {
+            for x in 0..size.width {
+                let cell = layout.of_pixel(x as i32, y as i32);
+                let around = [cell - 1, cell + 1, cell - layout.stride, cell + layout.stride];
+                if store.object[cell] < EMPTY && around.iter().any(|&other| differ(cell, other)) {
+                    waiting.push(size.index(x, y), x, y, Hole::ShadowEdge);
+                }
+            }
+        }
+    }
+
     fn shade(&self, store: &mut Store, display: &Display) {
         for i in 0..store.layout.len() {
             let object = store.object[i];
@@ -85,4 +111,13 @@ impl Relight {
             }
         }
     }
+}
+
+/// Bit i: light i is on and does not stand where it stood.
+fn moved(now: &[Light], before: &[Light]) -> u32 {
+    let place = |light: &Light| (light.position, light.backwards);
+    let lights = now.iter().zip(before).take(32).enumerate();
+    let moved = lights
+        .filter(|(_, (now, before))| now.intensity != [0.0; 3] && place(now) != place(before));
+    moved.fold(0, |bits, (i, _)| bits | 1 << i)
 }

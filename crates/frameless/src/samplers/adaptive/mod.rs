@@ -165,11 +165,17 @@ impl Sampler for Adaptive {
                 continue;
             }
             let why = state.why[observed.pixel as usize];
-            if !observed.known || why == Why::Hole {
+            if !observed.known {
                 continue;
             }
-            let weight = if why == Why::Front { 0.5 } else { 1.0 };
-            state.rates.observe(tile, observed, weight);
+            let weight = match why {
+                Why::Tile => 1.0,
+                Why::Front => 0.5,
+                Why::Hole => 0.0,
+            };
+            if weight > 0.0 {
+                state.rates.observe(tile, observed, weight);
+            }
             if state.front_share > 0.0 {
                 state.front.observe(observed, canvas);
             }
