@@ -212,6 +212,7 @@ impl Store {
         }
     }
 
+<<<<<<< HEAD
     pub(super) fn get(&self, i: usize) -> Sample {
         Sample {
             rgb: std::array::from_fn(|k| self.rgb[k][i]),
@@ -224,6 +225,8 @@ impl Store {
         }
     }
 
+=======
+>>>>>>> speed
     pub(super) fn set(&mut self, i: usize, sample: &Sample) {
         (0..3).for_each(|k| self.rgb[k][i] = sample.rgb[k]);
         [self.px[0][i], self.px[1][i]] = sample.px;

@@ -319,6 +319,7 @@ impl wide::Task for StepAside<'_> {
         scatter(moves, &carried.depth, &mut store.depth);
         scatter(moves, &old.tick, &mut store.tick);
         scatter(moves, &old.anchor, &mut store.anchor);
+        scatter(moves, &old.shade, &mut store.shade);
     }
 }
 

@@ -74,7 +74,10 @@ impl Credit {
         for &tile in &self.rich {
             let rect = rates.grid.rect(tile as usize);
             let (dx, dy) = self.order[self.place[tile as usize] as usize & (self.order.len() - 1)];
-            let i = canvas.size().index(rect.x0 + dx, rect.y0 + dy) as usize;
+            let i = canvas
+                .size()
+                .index((rect.x0 + dx).min(rect.x1 - 1), (rect.y0 + dy).min(rect.y1 - 1))
+                as usize;
             wide::prefetch(canvas.known(), i);
             wide::prefetch(canvas.time(), i);
         }
