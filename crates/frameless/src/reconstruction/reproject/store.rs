@@ -212,21 +212,6 @@ impl Store {
         }
     }
 
-<<<<<<< HEAD
-    pub(super) fn get(&self, i: usize) -> Sample {
-        Sample {
-            rgb: std::array::from_fn(|k| self.rgb[k][i]),
-            px: [self.px[0][i], self.px[1][i]],
-            depth: self.depth[i],
-            tick: Tick(self.tick[i]),
-            object: self.object[i],
-            anchor: self.anchor[i],
-            shade: self.shade[i],
-        }
-    }
-
-=======
->>>>>>> speed
     pub(super) fn set(&mut self, i: usize, sample: &Sample) {
         (0..3).for_each(|k| self.rgb[k][i] = sample.rgb[k]);
         [self.px[0][i], self.px[1][i]] = sample.px;
