@@ -15,8 +15,10 @@ const COLOURS: usize = 7;
 pub(crate) struct Chart {
     /// What the curves show.
     pub(crate) y_label: String,
-    /// In seconds.
-    pub(crate) time: Range<f64>,
+    /// What lies along the axis, with its unit: `seconds`.
+    pub(crate) x_label: String,
+    /// In that unit.
+    pub(crate) range: Range<f64>,
     /// Up to here nothing is scored, in seconds.
     pub(crate) unscored_until: f64,
     /// When something sudden happens, in seconds, and what.
@@ -83,12 +85,12 @@ impl Chart {
                 line.grid x1=(left) x2=(right) y1=(self.y(value)) y2=(self.y(value)) {}
                 text x=(left - 8.0) y=(self.y(value) + 4.0) text-anchor="end" { (shown(value)) }
             }
-            @for secs in ticks(self.time.clone()) {
+            @for secs in ticks(self.range.clone()) {
                 line.axis x1=(self.x(secs)) x2=(self.x(secs)) y1=(bottom) y2=(bottom + 4.0) {}
                 text x=(self.x(secs)) y=(labels_y) text-anchor="middle" { (shown(secs)) }
             }
             line.axis x1=(left) x2=(right) y1=(bottom) y2=(bottom) {}
-            text x=(right) y=(labels_y + 16.0) text-anchor="end" { "seconds" }
+            text x=(right) y=(labels_y + 16.0) text-anchor="end" { (self.x_label) }
             text x=(left) y=(top - 10.0) { (self.y_label) }
         }
     }
@@ -96,7 +98,7 @@ impl Chart {
     fn marks(&self) -> Markup {
         let [left, top, right, bottom] = PLOT;
         html! {
-            @if self.unscored_until > self.time.start {
+            @if self.unscored_until > self.range.start {
                 rect.unscored x=(left) y=(top) width=(self.x(self.unscored_until) - left) height=(bottom - top) {
                     title { "not scored" }
                 }
@@ -149,7 +151,7 @@ impl Chart {
     }
 
     fn x(&self, secs: f64) -> f64 {
-        let part = (secs - self.time.start) / (self.time.end - self.time.start);
+        let part = (secs - self.range.start) / (self.range.end - self.range.start);
         PLOT[0] + part * (PLOT[2] - PLOT[0])
     }
 
@@ -201,7 +203,8 @@ mod tests {
     fn a_chart_of_zeros_and_of_nothing_is_drawn() {
         let chart = |points: Vec<(f64, f64)>| Chart {
             y_label: "RMSE".into(),
-            time: 0.0..1.0,
+            x_label: "seconds".into(),
+            range: 0.0..1.0,
             unscored_until: 0.0,
             events: vec![(0.5, "<cut>".into())],
             series: vec![Series { name: "a".into(), index: 8, points, mean: 0.0 }],

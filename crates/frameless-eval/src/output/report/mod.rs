@@ -1,5 +1,6 @@
 //! `report.html`: everything that came out, for people, in one file that needs nothing else.
 
+mod control;
 mod factors;
 mod gallery;
 mod rankings;
@@ -77,6 +78,7 @@ impl Report<'_> {
                     main {
                         (rankings::section(self.results))
                         (factors::section(self.results))
+                        (control::section(self.results))
                         @for section in sections { (section) }
                     }
                     (summary::footer())
@@ -94,6 +96,7 @@ impl Report<'_> {
                 div.links {
                     a href="#ranking" { "Ranking" }
                     @if !self.results.equal_quality.is_empty() { a href="#equal-quality" { "Equal quality" } }
+                    @if control::has_curve(self.results) { a href="#control" { "Control" } }
                     @for scene in scenes { a href={ "#scene-" (scene) } { (scene) } }
                 }
                 div.switch data-switch="rate" role="group" aria-label="samples per second" {

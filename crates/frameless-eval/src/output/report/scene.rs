@@ -49,7 +49,8 @@ pub(crate) fn error_chart(results: &Results, scene: &str, samples_per_sec: f64) 
     let end = run.map_or(1.0, |run| secs_of(run, run.refreshes - 1));
     Chart {
         y_label: format!("RMSE against the ideal, {scene}"),
-        time: 0.0..end,
+        x_label: "seconds".into(),
+        range: 0.0..end,
         unscored_until: run
             .map_or(0.0, |run| secs_of(run, results.unscored_refreshes) - secs_of(run, 0)),
         events: events_of(results, scene).iter().map(|e| (e.secs, e.name.clone())).collect(),
@@ -149,7 +150,8 @@ fn at_rest(results: &Results, scene: &str, samples_per_sec: f64) -> Markup {
     }
     let chart = Chart {
         y_label: format!("RMSE against 64 samples per pixel, {scene}"),
-        time: start..end,
+        x_label: "seconds".into(),
+        range: start..end,
         unscored_until: start,
         events: Vec::new(),
         series,

@@ -103,10 +103,18 @@ impl State {
         }
     }
 
-    fn choose_fronts(&mut self, canvas: &Canvas, rest: usize, requests: &mut Vec<Request>) {
+    fn choose_fronts(
+        &mut self,
+        canvas: &Canvas,
+        rest: usize,
+        temporal: f32,
+        requests: &mut Vec<Request>,
+    ) {
         let hot = self.rates.all().iter().filter(|&&rate| rate > HOT_RATE).count();
         let hot_part = hot as f32 / self.rates.all().len() as f32;
-        self.front_share = FRONT_SHARE * (2.0 - hot_part / HOT_PART).clamp(0.0, 1.0);
+        // Who would rather finish what is there lets fronts wait.
+        let wanted = (temporal / DEFAULT_TEMPORAL).min(1.0);
+        self.front_share = wanted * FRONT_SHARE * (2.0 - hot_part / HOT_PART).clamp(0.0, 1.0);
         if self.front_share == 0.0 {
             self.front.clear();
             return;
@@ -134,7 +142,7 @@ impl Sampler for Adaptive {
         let unknown = canvas.holes().len() as f32 / canvas.size().pixels() as f32;
         let hole_share = HOLE_SHARE.max(unknown);
         state.choose_holes(canvas, (hole_share * count as f32) as usize, requests);
-        state.choose_fronts(canvas, count - (requests.len() - start), requests);
+        state.choose_fronts(canvas, count - (requests.len() - start), self.temporal, requests);
         let State { credit, refine, rates, why, owed, .. } = state;
         let left = (count - (requests.len() - start)) as f32;
         let spatial = left * (1.0 - refine.temporal_part(self.temporal));
