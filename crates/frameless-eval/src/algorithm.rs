@@ -42,7 +42,8 @@ const PLAIN: [(&str, Algorithm); 7] = [
 
 impl Algorithm {
     /// `random`, `permutation`, `change`, `framed`, `framed-single`, `lowres60`, `lowres30`, `progressive`,
-    /// `temporal`, `oracle-hold`, `adaptive`; with parameters: `change(w_d=0.7,tile=8)`, `adaptive(temporal=0.5)`. After a sampler
+    /// `temporal`, `oracle-hold`, `adaptive`; with parameters: `change(w_d=0.7,tile=8)`, `adaptive(temporal=0.5)`, and
+    /// `adaptive` with strengths of [`frameless::Weights`]: `contrast=0.5`, `flow=0.5`, `gaze=0.5` (at the middle). After a sampler
     /// `+hold`, `+filter` or `+reproject` with its options, see [`ReconstructionKind::name`]; without, it is `+hold`.
     ///
     /// # Errors
@@ -150,10 +151,29 @@ fn sampler_name(kind: &SamplerKind) -> String {
         SamplerKind::Change { w_d, tile } if *kind != SamplerKind::CHANGE => {
             format!("change(w_d={w_d},tile={tile})")
         }
-        SamplerKind::Adaptive { temporal } if *kind != SamplerKind::ADAPTIVE => {
-            format!("adaptive(temporal={temporal})")
+        SamplerKind::Adaptive { .. } => {
+            let named = adaptive_parameters(kind)
+                .into_iter()
+                .zip(adaptive_parameters(&SamplerKind::ADAPTIVE));
+            let other = named.filter(|((_, value), (_, default))| value != default);
+            let other: Vec<String> =
+                other.map(|((key, value), _)| format!("{key}={value}")).collect();
+            match other.is_empty() {
+                true => kind.name().into(),
+                false => format!("{}({})", kind.name(), other.join(",")),
+            }
         }
         kind => kind.name().into(),
+    }
+}
+
+/// Name and value of all parameters of `adaptive`; none of other samplers.
+fn adaptive_parameters(kind: &SamplerKind) -> Vec<(&'static str, f32)> {
+    match *kind {
+        SamplerKind::Adaptive { temporal, contrast, flow, gaze } => {
+            vec![("temporal", temporal), ("contrast", contrast), ("flow", flow), ("gaze", gaze)]
+        }
+        _ => Vec::new(),
     }
 }
 
@@ -176,8 +196,15 @@ fn with_parameters(kind: SamplerKind, name: &str, text: &str) -> Result<SamplerK
             (SamplerKind::Change { tile, .. }, "tile") => {
                 *tile = value.parse().map_err(|_| wrong())?
             }
-            (SamplerKind::Adaptive { temporal }, "temporal") => {
-                *temporal = value.parse().map_err(|_| wrong())?
+            (SamplerKind::Adaptive { temporal, contrast, flow, gaze }, key) => {
+                let parameter = match key {
+                    "temporal" => temporal,
+                    "contrast" => contrast,
+                    "flow" => flow,
+                    "gaze" => gaze,
+                    _ => return Err(wrong()),
+                };
+                *parameter = value.parse().map_err(|_| wrong())?
             }
             _ => return Err(wrong()),
         }
@@ -186,8 +213,12 @@ fn with_parameters(kind: SamplerKind, name: &str, text: &str) -> Result<SamplerK
         SamplerKind::Change { w_d, tile } if !(0.0..=1.0).contains(&w_d) || tile == 0 => {
             Err(format!("algorithm {name:?}: w_d must be in [0, 1] and tile at least 1"))
         }
-        SamplerKind::Adaptive { temporal } if !(0.0..=1.0).contains(&temporal) => {
-            Err(format!("algorithm {name:?}: temporal must be in [0, 1]"))
+        SamplerKind::Adaptive { temporal, contrast, flow, gaze } => {
+            let is_part = [temporal, gaze].iter().all(|part| (0.0..=1.0).contains(part));
+            let is_strength = [contrast, flow].iter().all(|s| (-1.0..=1.0).contains(s));
+            let ranges = "temporal and gaze must be in [0, 1], contrast and flow in [-1, 1]";
+            let is_valid = is_part && is_strength;
+            is_valid.then_some(kind).ok_or_else(|| format!("algorithm {name:?}: {ranges}"))
         }
         kind => Ok(kind),
     }
@@ -211,6 +242,7 @@ mod tests {
             "adaptive+reproject",
             "adaptive+reproject+deep",
             "adaptive(temporal=0.25)+reproject+relight",
+            "adaptive(contrast=-0.5,gaze=1)+reproject",
         ];
         for name in plain.into_iter().chain(samplers) {
             assert_eq!(Algorithm::from_name(name).expect(name).name(), name);
@@ -232,6 +264,9 @@ mod tests {
             "change(x=1)",
             "change(temporal=1)",
             "adaptive(temporal=2)",
+            "adaptive(gaze=-1)",
+            "adaptive(flow=NaN)",
+            "adaptive(speed=1)",
             "adaptive+deep",
             "change(w_d",
         ] {

@@ -93,7 +93,7 @@ impl<S: Stage> Session<S> {
     fn set(&mut self, new: Settings) {
         let old = std::mem::replace(&mut self.settings, new);
         match (old.sampler, new.sampler) {
-            (SamplerKind::Adaptive { .. }, SamplerKind::Adaptive { temporal }) => {
+            (SamplerKind::Adaptive { .. }, SamplerKind::Adaptive { temporal, .. }) => {
                 self.engine.set_temporal(temporal);
             }
             (old, new) if old == new => {}
@@ -328,7 +328,8 @@ mod tests {
         let learned = |session: &Session<Plain>| session.engine.rates().map(|r| r.of_pixel(0));
         let before = learned(&session);
         assert!(before > Some(0.0), "{before:?}");
-        let sampler = SamplerKind::Adaptive { temporal: 0.9 };
+        let sampler =
+            SamplerKind::Adaptive { temporal: 0.9, contrast: 0.0, flow: 0.0, gaze: 0.0 };
         session.apply(Command::Settings(Settings { sampler, ..adaptive }));
         assert_eq!(learned(&session), before);
     }

@@ -15,6 +15,8 @@ pub struct Canvas {
     holes_at: Time,
     samples: Vec<u16>,
     samples_wanted: u16,
+    tile_contrast: Vec<f32>,
+    tile_motion: Vec<Option<[f32; 2]>>,
 }
 
 impl Canvas {
@@ -44,6 +46,8 @@ impl Canvas {
             holes_at: Time::ZERO,
             samples: vec![0; size.pixels()],
             samples_wanted: 0,
+            tile_contrast: Vec::new(),
+            tile_motion: Vec::new(),
         }
     }
 
@@ -96,6 +100,18 @@ impl Canvas {
         self.samples_wanted
     }
 
+    /// Spatial contrast of every tile of the sampler's [`Rates`](crate::Rates) in the picture before the last: mean squared difference of
+    /// neighbouring pixels, per channel, display-referred. Empty if nobody has said.
+    pub fn tile_contrast(&self) -> &[f32] {
+        &self.tile_contrast
+    }
+
+    /// How far what is seen in the middle of every such tile has moved between the last two refreshes, in pixels; `None` where that
+    /// is not known. Empty if nobody has said, or wanted to know.
+    pub fn tile_motion(&self) -> &[Option<[f32; 2]>] {
+        &self.tile_motion
+    }
+
     /// How often a reconstruction has said anew what the pixels show: then all of [`Canvas::time`], [`Canvas::known`] and
     /// [`Canvas::holes`] may have changed without a sample.
     pub fn updates(&self) -> u64 {
@@ -126,6 +142,17 @@ impl Canvas {
     pub(crate) fn set_samples(&mut self, wanted: u16, count: &[u16]) {
         self.samples_wanted = wanted;
         self.samples.clone_from_slice(count);
+    }
+
+    /// What the tiles show; see [`Canvas::tile_contrast`] and [`Canvas::tile_motion`].
+    pub(crate) fn set_tiles(
+        &mut self,
+        contrast: &[f32],
+        motion: impl Iterator<Item = Option<[f32; 2]>>,
+    ) {
+        contrast.clone_into(&mut self.tile_contrast);
+        self.tile_motion.clear();
+        self.tile_motion.extend(motion);
     }
 
     /// A sample has been added to those of a pixel at rest; returns the time and colour of the one at its centre, which stays.
@@ -171,6 +198,8 @@ impl Canvas {
             holes_at: self.holes_at,
             samples: vec![0; size.pixels()],
             samples_wanted: 0,
+            tile_contrast: Vec::new(),
+            tile_motion: Vec::new(),
         }
     }
 }

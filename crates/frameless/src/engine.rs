@@ -5,6 +5,7 @@ use thiserror::Error;
 use crate::{
     Answer, Batch, Canvas, Clock, Display, Findings, Hold, Kept, Lighting, Observation, Pose,
     Rates, Reconstruction, Refresh, Request, Sampler, Size, Surface, Time, Timeline, Tracer,
+    Weights,
 };
 
 /// Everything that runs a frameless picture: a clock, a sampler, a renderer, and the canvas between them.
@@ -305,7 +306,8 @@ impl<T: Tracer> Engine<T> {
         let lighting = lighting.then_some(&self.lighting);
         let rates = self.sampler.rates().filter(|rates| rates.size() == size);
         let (display, is_noisy) = (&self.display, self.tracer.is_noisy());
-        let refresh = Refresh { now, pose, lighting, display, is_noisy, rates };
+        let wants_motion = self.sampler.wants_motion();
+        let refresh = Refresh { now, pose, lighting, display, is_noisy, rates, wants_motion };
         self.reconstruction.refresh(&refresh, &mut self.canvas, &mut self.picture);
         &self.picture
     }
@@ -391,6 +393,11 @@ impl<T: Tracer> Engine<T> {
     /// Trade temporal against spatial accuracy, see [`Sampler::set_temporal`].
     pub fn set_temporal(&mut self, temporal: f32) {
         self.sampler.set_temporal(temporal);
+    }
+
+    /// Count parts of the picture differently, see [`Weights`]. A sampler set later begins without.
+    pub fn set_weights(&mut self, weights: &Weights) {
+        self.sampler.set_weights(weights);
     }
 
     /// The renderer.

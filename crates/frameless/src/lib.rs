@@ -45,6 +45,7 @@ mod tile_pdf;
 mod time;
 mod timeline;
 mod tracer;
+mod weights;
 mod wide;
 
 pub use time::Time;
@@ -53,6 +54,7 @@ pub use sample::{Answer, Batch, Request, Size, Surface};
 
 pub use sampler::{Insight, Observation, Refinement, Sampler};
 pub use samplers::{Adaptive, Change, DEFAULT_TILE, DEFAULT_W_D, Permutation, Random, SamplerKind};
+pub use weights::{Gaze, WeightError, Weights};
 
 pub use lighting::{Arriving, Light, Lighting, Placement};
 pub use pose::{Deformed, Pose, Projected, Projection};

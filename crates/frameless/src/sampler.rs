@@ -1,6 +1,6 @@
 //! The contract between the loop and whoever decides which pixels are traced next.
 
-use crate::{Canvas, Rates, Request, Time};
+use crate::{Canvas, Rates, Request, Time, Weights};
 
 /// What became of one sample, as told to the sampler.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,6 +51,16 @@ pub trait Sampler: Send {
     /// what is there. What has been learned stays. Samplers that have no such choice ignore it.
     fn set_temporal(&mut self, temporal: f32) {
         let _ = temporal;
+    }
+
+    /// Count parts of the picture differently from now on. What has been learned stays. Samplers that know no weights ignore it.
+    fn set_weights(&mut self, weights: &Weights) {
+        let _ = weights;
+    }
+
+    /// Whether [`Canvas::tile_motion`] is of use.
+    fn wants_motion(&self) -> bool {
+        false
     }
 
     /// How fast each part of the picture changes, if the sampler learns it; reconstructions weigh samples with it.

@@ -2,7 +2,7 @@
 
 mod world;
 
-use frameless::{ReconstructionKind, Time};
+use frameless::{ReconstructionKind, Time, Weights};
 use world::*;
 
 #[test]
@@ -119,4 +119,24 @@ fn a_picture_of_which_nothing_is_known_appears_everywhere_at_once() {
     let error = rmse(&picture, &world.ideal(secs));
     assert!(error < 0.05, "{error}");
     assert!(picture.iter().all(|c| c[1] > 0.1), "no pixel is black");
+}
+
+#[test]
+fn the_sampler_is_told_how_tiles_move_if_it_wants_to_know() {
+    let disc = |secs: f64| [20.0 + 60.0 * secs as f32, 36.0, 14.0];
+    let mut engine = engine(world(translating, disc), ReconstructionKind::REPROJECT, 83_000.0);
+    play(&mut engine, 10);
+    assert!(engine.canvas().tile_motion().is_empty(), "nobody asked");
+    assert_eq!(engine.canvas().tile_contrast().len(), 12 * 9);
+    engine.set_weights(&Weights::default().with_flow(1.0).expect("valid"));
+    let (_, secs) = play(&mut engine, 20);
+    // The disc's middle in the picture, and a corner where the plane is seen.
+    let [x, y] = [20.0 + 100.0 * secs, 36.0 - 25.0 * secs].map(|c| c as usize / 8);
+    let expected = [(y * 12 + x, [100.0, -25.0]), (11, [40.0, -25.0])];
+    for (tile, px_per_sec) in expected {
+        let motion = engine.canvas().tile_motion()[tile].expect("something is seen there");
+        for (is, per_sec) in motion.into_iter().zip(px_per_sec) {
+            assert!((is - per_sec / 60.0).abs() < 1e-3, "tile {tile}: {motion:?}");
+        }
+    }
 }

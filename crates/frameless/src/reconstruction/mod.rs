@@ -54,6 +54,8 @@ pub struct Refresh<'a> {
     pub is_noisy: bool,
     /// How fast each part of the picture changes; `None` if nobody has learned it.
     pub rates: Option<&'a Rates>,
+    /// Whether the sampler wants to know [`Canvas::tile_motion`].
+    pub wants_motion: bool,
 }
 
 /// Makes pictures of samples.

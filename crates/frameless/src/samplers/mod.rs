@@ -11,7 +11,7 @@ pub use change::{Change, DEFAULT_TILE, DEFAULT_W_D};
 pub use permutation::Permutation;
 pub use random::Random;
 
-use crate::Sampler;
+use crate::{Sampler, Weights};
 
 /// The samplers that come with the crate, with their parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +31,12 @@ pub enum SamplerKind {
     Adaptive {
         /// Temporal against spatial accuracy, in [0, 1]; see [`Sampler::set_temporal`].
         temporal: f32,
+        /// See [`Weights::with_contrast`]; in [−1, 1].
+        contrast: f32,
+        /// See [`Weights::with_flow`]; in [−1, 1].
+        flow: f32,
+        /// Strength of a gaze at the picture's middle with [`Gaze::RADIUS`](crate::Gaze::RADIUS); in [0, 1].
+        gaze: f32,
     },
 }
 
@@ -46,7 +52,8 @@ impl SamplerKind {
     pub const CHANGE: SamplerKind = SamplerKind::Change { w_d: DEFAULT_W_D, tile: DEFAULT_TILE };
 
     /// `adaptive` with the measured default.
-    pub const ADAPTIVE: SamplerKind = SamplerKind::Adaptive { temporal: DEFAULT_TEMPORAL };
+    pub const ADAPTIVE: SamplerKind =
+        SamplerKind::Adaptive { temporal: DEFAULT_TEMPORAL, contrast: 0.0, flow: 0.0, gaze: 0.0 };
 
     /// Every kind with its default parameters.
     pub const ALL: [SamplerKind; 4] =
@@ -73,7 +80,11 @@ impl SamplerKind {
             SamplerKind::Random => Box::new(Random::new(seed)),
             SamplerKind::Permutation => Box::new(Permutation::new(seed)),
             SamplerKind::Change { w_d, tile } => Box::new(Change::new(w_d, tile, seed)),
-            SamplerKind::Adaptive { temporal } => Box::new(Adaptive::new(temporal, seed)),
+            SamplerKind::Adaptive { temporal, contrast, flow, gaze } => {
+                let mut adaptive = Adaptive::new(temporal, seed);
+                adaptive.set_weights(&Weights::clamped(contrast, flow, gaze));
+                Box::new(adaptive)
+            }
         }
     }
 }

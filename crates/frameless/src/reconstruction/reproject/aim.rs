@@ -2,6 +2,7 @@
 
 use super::Reproject;
 use super::store::surface;
+use crate::tile::TileGrid;
 use crate::{Request, Time};
 
 /// Where to look for a surface in a hole: the farthest of these neighbours has probably been uncovered.
@@ -40,6 +41,16 @@ impl Reproject {
         let before = self.poses[1].project(&surface)?.px;
         let motion = [here[0] - before[0], here[1] - before[1]];
         (motion[0].abs() < FASTEST_PX && motion[1].abs() < FASTEST_PX).then_some(motion)
+    }
+
+    /// How far what is seen in the middle of each tile has moved between the last two refreshes.
+    pub(super) fn tile_motion(&self, grid: &TileGrid) -> impl Iterator<Item = Option<[f32; 2]>> {
+        (0..grid.len()).map(move |tile| {
+            let rect = grid.rect(tile);
+            let (x, y) = ((rect.x0 + rect.x1) / 2, (rect.y0 + rect.y1) / 2);
+            // Before the second refresh nothing is known to move.
+            (self.refreshes >= 2).then(|| self.motion(grid.size.index(x, y))).flatten()
+        })
     }
 
     fn uncovered(&self, x: u32, y: u32) -> Option<usize> {

@@ -191,5 +191,8 @@ impl Reconstruction for Reproject {
         waiting.order(&mut self.holes);
         canvas.update(refresh.now, &mut self.holes, time, known);
         canvas.set_samples(wanted, self.settled.counts());
+        let grid = refresh.rates.filter(|_| refresh.wants_motion).map(|rates| &rates.grid);
+        let motion = grid.into_iter().flat_map(|grid| self.tile_motion(grid));
+        canvas.set_tiles(&self.contrast, motion);
     }
 }

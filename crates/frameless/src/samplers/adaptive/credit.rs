@@ -1,12 +1,13 @@
 //! The even share of the tiles: a deterministic draw by credit, and Bayer's order inside a tile.
 //!
 //! ```text
-//! c_i ← c_i + n · ((1 − ε) √v_i / Σ√v + ε / N)        for every tile i of N, n samples to be given out
+//! c_i ← c_i + n · ((1 − ε) m_i √v_i / Σ m√v + ε / N)    for every tile i of N, n samples to be given out
 //! while c_i ≥ 1:  c_i ← c_i − 1, draw tile i
 //! ```
 //!
 //! The square root is the optimum for jump-like change: a pixel traced f times a second with an error that grows like v · age is
-//! off by v / 2f on average, and Σ v_i / f_i at given Σ f_i is least for f_i ∝ √v_i.
+//! off by v / 2f on average, and Σ v_i / f_i at given Σ f_i is least for f_i ∝ √v_i. m_i is how much the tile counts
+//! ([`weights`](super::weights)); the even part is not weighted.
 
 use crate::bayer;
 use crate::rates::Rates;
@@ -31,10 +32,23 @@ pub(crate) struct Credit {
 }
 
 /// The part of the samples that each tile gets, of those that holes and fronts leave.
-pub(crate) fn shares(rates: &[f32]) -> Vec<f32> {
-    let sum: f32 = rates.iter().map(|rate| (rate + LEAST_RATE).sqrt()).sum();
-    let evenly = EVENLY / rates.len() as f32;
-    rates.iter().map(|rate| (1.0 - EVENLY) * (rate + LEAST_RATE).sqrt() / sum + evenly).collect()
+pub(crate) fn shares(rates: &[f32], weights: &[f32]) -> Vec<f32> {
+    let mut shares = vec![0.0; rates.len()];
+    weigh(rates, weights, &mut shares);
+    let (sum, evenly): (f32, f32) = (shares.iter().sum(), EVENLY / rates.len() as f32);
+    shares.iter_mut().for_each(|share| *share = (1.0 - EVENLY) * *share / sum + evenly);
+    shares
+}
+
+/// m √v of every tile; without `weights` all m are 1.
+fn weigh(rates: &[f32], weights: &[f32], weighed: &mut [f32]) {
+    // Flat loops, one thing each: the compiler makes vectors of them.
+    for (weighed, rate) in weighed.iter_mut().zip(rates) {
+        *weighed = (rate + LEAST_RATE).sqrt();
+    }
+    for (weighed, m) in weighed.iter_mut().zip(weights) {
+        *weighed *= m;
+    }
 }
 
 impl Credit {
@@ -53,15 +67,12 @@ impl Credit {
         &mut self,
         now: Time,
         canvas: &Canvas,
-        rates: &Rates,
+        (rates, weights): (&Rates, &[f32]),
         count: f32,
         mut take: impl FnMut(u32),
     ) {
         let tiles = self.credit.len();
-        // Flat loops, one thing each: the compiler makes vectors of all but the sum.
-        for (weight, rate) in self.weight.iter_mut().zip(rates.all()) {
-            *weight = (rate + LEAST_RATE).sqrt();
-        }
+        weigh(rates.all(), weights, &mut self.weight);
         let sum: f32 = self.weight.iter().sum();
         let (per_weight, evenly) = ((1.0 - EVENLY) * count / sum, EVENLY * count / tiles as f32);
         for (credit, weight) in self.credit.iter_mut().zip(&self.weight) {

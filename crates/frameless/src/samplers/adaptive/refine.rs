@@ -1,11 +1,11 @@
 //! What is at rest is refined: more samples for pixels that show the mean of a few.
 //!
 //! ```text
-//! c_i ← c_i + n · u_i σ_i / Σ u σ         for every tile i; while c_i ≥ 1: c_i ← c_i − 1, refine a pixel of tile i
+//! c_i ← c_i + n · u_i m_i σ_i / Σ u m σ   for every tile i; while c_i ≥ 1: c_i ← c_i − 1, refine a pixel of tile i
 //! ```
 //!
 //! σ²_i is the variance of a pixel's samples in the tile, by noise or because the pixel is not all one colour, and u_i the part of its
-//! pixels that are at rest and have not enough samples yet. Samples in proportion to σ make Σ σ²/n least (Neyman 1934); some are
+//! pixels that are at rest and have not enough samples yet, m_i how much the tile counts ([`weights`](super::weights)). Samples in proportion to σ make Σ σ²/n least (Neyman 1934); some are
 //! given out as if all tiles were alike, since σ itself is only an estimate.
 //!
 //! How many samples go to change and how many to refinement follows from what is to be gained, and from the control τ:
@@ -123,20 +123,22 @@ impl Refine {
     pub(crate) fn draw(
         &mut self,
         canvas: &Canvas,
-        grid: &TileGrid,
+        (grid, weights): (&TileGrid, &[f32]),
         count: f32,
         mut take: impl FnMut(Request),
     ) {
         let tiles = self.variance.len();
         let mean = self.variance.iter().sum::<f32>() / tiles as f32;
         let evenly = EVENLY * mean.sqrt() + 1e-6;
-        let weight = |tile: usize| self.unfinished[tile] * (self.variance[tile].sqrt() + evenly);
+        let m = |tile: usize| weights.get(tile).copied().unwrap_or(1.0);
+        let weight =
+            |tile: usize| self.unfinished[tile] * (m(tile) * self.variance[tile].sqrt() + evenly);
         let sum: f32 = (0..tiles).map(weight).sum();
         if sum <= 0.0 {
             return;
         }
         for tile in 0..tiles {
-            let weight = self.unfinished[tile] * (self.variance[tile].sqrt() + evenly);
+            let weight = self.unfinished[tile] * (m(tile) * self.variance[tile].sqrt() + evenly);
             self.credit[tile] += count * weight / sum;
             while self.credit[tile] >= 1.0 {
                 self.credit[tile] -= 1.0;
