@@ -1,6 +1,6 @@
 //! Who competes, by name.
 
-use frameless::{ReconstructionKind, SamplerKind, Size};
+use frameless::{AdaptiveStage, ReconstructionKind, SamplerKind, Size};
 
 use crate::contender::{Arena, Contender};
 use crate::contenders::{
@@ -42,7 +42,7 @@ const PLAIN: [(&str, Algorithm); 7] = [
 
 impl Algorithm {
     /// `random`, `permutation`, `change`, `framed`, `framed-single`, `lowres60`, `lowres30`, `progressive`,
-    /// `temporal`, `oracle-hold`, `adaptive`; with parameters: `change(w_d=0.7,tile=8)`, `adaptive(temporal=0.5)`. After a sampler
+    /// `temporal`, `oracle-hold`, `adaptive`; with parameters: `change(w_d=0.7,tile=8)`, `adaptive(temporal=0.5)`, `adaptive(without=fronts)`. After a sampler
     /// `+hold`, `+filter` or `+reproject` with its options, see [`ReconstructionKind::name`]; without, it is `+hold`.
     ///
     /// # Errors
@@ -150,8 +150,13 @@ fn sampler_name(kind: &SamplerKind) -> String {
         SamplerKind::Change { w_d, tile } if *kind != SamplerKind::CHANGE => {
             format!("change(w_d={w_d},tile={tile})")
         }
-        SamplerKind::Adaptive { temporal } if *kind != SamplerKind::ADAPTIVE => {
-            format!("adaptive(temporal={temporal})")
+        SamplerKind::Adaptive { temporal, without } if *kind != SamplerKind::ADAPTIVE => {
+            let is_default = SamplerKind::Adaptive { temporal: *temporal, without: None }
+                == SamplerKind::ADAPTIVE;
+            let temporal = (!is_default).then(|| format!("temporal={temporal}"));
+            let without = without.map(|stage| format!("without={}", stage.name()));
+            let given: Vec<String> = temporal.into_iter().chain(without).collect();
+            format!("adaptive({})", given.join(","))
         }
         kind => kind.name().into(),
     }
@@ -161,7 +166,7 @@ fn sampler_name(kind: &SamplerKind) -> String {
 fn with_parameters(kind: SamplerKind, name: &str, text: &str) -> Result<SamplerKind, String> {
     let example = match kind {
         SamplerKind::Change { .. } => "change(w_d=0.9,tile=16)",
-        SamplerKind::Adaptive { .. } => "adaptive(temporal=0.5)",
+        SamplerKind::Adaptive { .. } => "adaptive(temporal=0.5) or adaptive(without=fronts)",
         _ => return Err(format!("algorithm {name:?}: {} has no parameters", kind.name())),
     };
     let wrong = || format!("algorithm {name:?}: wanted {example}");
@@ -176,8 +181,11 @@ fn with_parameters(kind: SamplerKind, name: &str, text: &str) -> Result<SamplerK
             (SamplerKind::Change { tile, .. }, "tile") => {
                 *tile = value.parse().map_err(|_| wrong())?
             }
-            (SamplerKind::Adaptive { temporal }, "temporal") => {
+            (SamplerKind::Adaptive { temporal, .. }, "temporal") => {
                 *temporal = value.parse().map_err(|_| wrong())?
+            }
+            (SamplerKind::Adaptive { without, .. }, "without") => {
+                *without = Some(AdaptiveStage::from_name(value).ok_or_else(wrong)?)
             }
             _ => return Err(wrong()),
         }
@@ -186,7 +194,7 @@ fn with_parameters(kind: SamplerKind, name: &str, text: &str) -> Result<SamplerK
         SamplerKind::Change { w_d, tile } if !(0.0..=1.0).contains(&w_d) || tile == 0 => {
             Err(format!("algorithm {name:?}: w_d must be in [0, 1] and tile at least 1"))
         }
-        SamplerKind::Adaptive { temporal } if !(0.0..=1.0).contains(&temporal) => {
+        SamplerKind::Adaptive { temporal, .. } if !(0.0..=1.0).contains(&temporal) => {
             Err(format!("algorithm {name:?}: temporal must be in [0, 1]"))
         }
         kind => Ok(kind),
@@ -211,6 +219,10 @@ mod tests {
             "adaptive+reproject",
             "adaptive+reproject+deep",
             "adaptive(temporal=0.25)+reproject+relight",
+            "adaptive(without=fronts)+reproject",
+            "adaptive(without=holes)+reproject",
+            "adaptive(without=rates)+reproject",
+            "adaptive(temporal=0.25,without=bayer)+reproject(without=aim)+deep",
         ];
         for name in plain.into_iter().chain(samplers) {
             assert_eq!(Algorithm::from_name(name).expect(name).name(), name);
@@ -233,6 +245,8 @@ mod tests {
             "change(temporal=1)",
             "adaptive(temporal=2)",
             "adaptive+deep",
+            "adaptive(without=aim)",
+            "adaptive+reproject(without=rates)",
             "change(w_d",
         ] {
             let message = Algorithm::from_name(name).expect_err(name);

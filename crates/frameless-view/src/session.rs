@@ -93,7 +93,10 @@ impl<S: Stage> Session<S> {
     fn set(&mut self, new: Settings) {
         let old = std::mem::replace(&mut self.settings, new);
         match (old.sampler, new.sampler) {
-            (SamplerKind::Adaptive { .. }, SamplerKind::Adaptive { temporal }) => {
+            (
+                SamplerKind::Adaptive { without: before, .. },
+                SamplerKind::Adaptive { temporal, without },
+            ) if before == without => {
                 self.engine.set_temporal(temporal);
             }
             (old, new) if old == new => {}
@@ -328,7 +331,7 @@ mod tests {
         let learned = |session: &Session<Plain>| session.engine.rates().map(|r| r.of_pixel(0));
         let before = learned(&session);
         assert!(before > Some(0.0), "{before:?}");
-        let sampler = SamplerKind::Adaptive { temporal: 0.9 };
+        let sampler = SamplerKind::Adaptive { temporal: 0.9, without: None };
         session.apply(Command::Settings(Settings { sampler, ..adaptive }));
         assert_eq!(learned(&session), before);
     }

@@ -52,7 +52,9 @@ pub use time::Time;
 pub use sample::{Answer, Batch, Request, Size, Surface};
 
 pub use sampler::{Insight, Observation, Refinement, Sampler};
-pub use samplers::{Adaptive, Change, DEFAULT_TILE, DEFAULT_W_D, Permutation, Random, SamplerKind};
+pub use samplers::{
+    Adaptive, AdaptiveStage, Change, DEFAULT_TILE, DEFAULT_W_D, Permutation, Random, SamplerKind,
+};
 
 pub use lighting::{Arriving, Light, Lighting, Placement};
 pub use pose::{Deformed, Pose, Projected, Projection};
@@ -68,7 +70,7 @@ pub use display::Display;
 pub use rates::Rates;
 pub use reconstruction::{
     Filter, Findings, Hold, Kept, Reconstruction, ReconstructionKind, Refresh, Reproject,
-    ReprojectOptions, hold, hold_into,
+    ReprojectOptions, ReprojectStage, hold, hold_into,
 };
 
 pub use rng::Rng;

@@ -2,7 +2,9 @@
 
 mod world;
 
-use frameless::{ReconstructionKind, Time};
+use frameless::{
+    AdaptiveStage, ReconstructionKind, ReprojectOptions, ReprojectStage, SamplerKind, Time,
+};
 use world::*;
 
 #[test]
@@ -119,4 +121,30 @@ fn a_picture_of_which_nothing_is_known_appears_everywhere_at_once() {
     let error = rmse(&picture, &world.ideal(secs));
     assert!(error < 0.05, "{error}");
     assert!(picture.iter().all(|c| c[1] > 0.1), "no pixel is black");
+}
+
+#[test]
+fn every_stage_that_is_left_out_makes_a_difference() {
+    // Turns, approaches and stops, so that every stage has something to do.
+    let camera: Camera = |secs| {
+        let ([[a, b, c], [d, e, f]], [[zoom, ..], _]) =
+            (rotating(secs.min(0.4)), zooming(secs.min(0.4)));
+        [[zoom * a, b, c], [d, zoom * e, f]]
+    };
+    let disc = |secs: f64| [20.0 + 60.0 * secs.min(0.4) as f32, 36.0, 14.0];
+    let last = |without: Option<AdaptiveStage>, omitted: Option<ReprojectStage>| {
+        let options = ReprojectOptions { without: omitted, ..ReprojectOptions::default() };
+        let mut engine =
+            engine(world(camera, disc), ReconstructionKind::Reproject(options), 40_000.0);
+        engine.set_sampler(SamplerKind::Adaptive { temporal: 0.5, without }.build(1));
+        (0..30).flat_map(|_| play(&mut engine, 1).0).collect::<Vec<_>>()
+    };
+    let whole = last(None, None);
+    assert_eq!(differences(&whole, &last(None, None)), (0, 0.0));
+    for stage in AdaptiveStage::ALL {
+        assert!(differences(&whole, &last(Some(stage), None)).0 > 0, "{stage:?}");
+    }
+    for stage in ReprojectStage::ALL {
+        assert!(differences(&whole, &last(None, Some(stage))).0 > 0, "{stage:?}");
+    }
 }

@@ -5,8 +5,8 @@ mod change;
 mod permutation;
 mod random;
 
-pub use adaptive::Adaptive;
 pub(crate) use adaptive::DEFAULT_TEMPORAL;
+pub use adaptive::{Adaptive, AdaptiveStage};
 pub use change::{Change, DEFAULT_TILE, DEFAULT_W_D};
 pub use permutation::Permutation;
 pub use random::Random;
@@ -31,6 +31,8 @@ pub enum SamplerKind {
     Adaptive {
         /// Temporal against spatial accuracy, in [0, 1]; see [`Sampler::set_temporal`].
         temporal: f32,
+        /// What an experiment leaves out; `None`: nothing.
+        without: Option<AdaptiveStage>,
     },
 }
 
@@ -46,7 +48,8 @@ impl SamplerKind {
     pub const CHANGE: SamplerKind = SamplerKind::Change { w_d: DEFAULT_W_D, tile: DEFAULT_TILE };
 
     /// `adaptive` with the measured default.
-    pub const ADAPTIVE: SamplerKind = SamplerKind::Adaptive { temporal: DEFAULT_TEMPORAL };
+    pub const ADAPTIVE: SamplerKind =
+        SamplerKind::Adaptive { temporal: DEFAULT_TEMPORAL, without: None };
 
     /// Every kind with its default parameters.
     pub const ALL: [SamplerKind; 4] =
@@ -73,7 +76,9 @@ impl SamplerKind {
             SamplerKind::Random => Box::new(Random::new(seed)),
             SamplerKind::Permutation => Box::new(Permutation::new(seed)),
             SamplerKind::Change { w_d, tile } => Box::new(Change::new(w_d, tile, seed)),
-            SamplerKind::Adaptive { temporal } => Box::new(Adaptive::new(temporal, seed)),
+            SamplerKind::Adaptive { temporal, without } => {
+                Box::new(Adaptive::new(temporal, seed).without(without))
+            }
         }
     }
 }

@@ -8,6 +8,7 @@
 //! The square root is the optimum for jump-like change: a pixel traced f times a second with an error that grows like v · age is
 //! off by v / 2f on average, and Σ v_i / f_i at given Σ f_i is least for f_i ∝ √v_i.
 
+use super::AdaptiveStage;
 use crate::bayer;
 use crate::rates::Rates;
 use crate::{Canvas, Rng, Time, wide};
@@ -28,24 +29,40 @@ pub(crate) struct Credit {
     rich: Vec<u32>,
     /// Pixels of a tile in their order, relative to its corner.
     order: Vec<(u32, u32)>,
-}
-
-/// The part of the samples that each tile gets, of those that holes and fronts leave.
-pub(crate) fn shares(rates: &[f32]) -> Vec<f32> {
-    let sum: f32 = rates.iter().map(|rate| (rate + LEAST_RATE).sqrt()).sum();
-    let evenly = EVENLY / rates.len() as f32;
-    rates.iter().map(|rate| (1.0 - EVENLY) * (rate + LEAST_RATE).sqrt() / sum + evenly).collect()
+    /// Draws places instead of the order, if that is left out.
+    random: Option<Rng>,
+    /// Whether all tiles weigh the same.
+    evenly: bool,
 }
 
 impl Credit {
-    pub(crate) fn new(tiles: usize, side_bits: u32, rng: &mut Rng) -> Credit {
+    pub(crate) fn new(
+        tiles: usize,
+        side_bits: u32,
+        without: Option<AdaptiveStage>,
+        rng: &mut Rng,
+    ) -> Credit {
         Credit {
             credit: (0..tiles).map(|_| rng.unit_f32()).collect(),
             place: (0..tiles).map(|_| rng.next_u32()).collect(),
             weight: vec![0.0; tiles],
             rich: Vec::new(),
             order: bayer::order(side_bits),
+            random: (without == Some(AdaptiveStage::Bayer))
+                .then(|| Rng::new(u64::from(rng.next_u32()))),
+            evenly: without == Some(AdaptiveStage::Rates),
         }
+    }
+
+    /// The part of the samples that each tile gets, of those that holes and fronts leave.
+    pub(crate) fn shares(&self, rates: &[f32]) -> Vec<f32> {
+        let evenly = 1.0 / rates.len() as f32;
+        if self.evenly {
+            return vec![evenly; rates.len()];
+        }
+        let weights = rates.iter().map(|rate| (rate + LEAST_RATE).sqrt());
+        let sum: f32 = weights.clone().sum();
+        weights.map(|weight| (1.0 - EVENLY) * weight / sum + EVENLY * evenly).collect()
     }
 
     /// Gives out about `count` samples; exactly on average.
@@ -61,6 +78,9 @@ impl Credit {
         // Flat loops, one thing each: the compiler makes vectors of all but the sum.
         for (weight, rate) in self.weight.iter_mut().zip(rates.all()) {
             *weight = (rate + LEAST_RATE).sqrt();
+        }
+        if self.evenly {
+            self.weight.fill(1.0);
         }
         let sum: f32 = self.weight.iter().sum();
         let (per_weight, evenly) = ((1.0 - EVENLY) * count / sum, EVENLY * count / tiles as f32);
@@ -98,7 +118,10 @@ impl Credit {
         while tries < TRIES {
             // As many as a power of two.
             let (dx, dy) = self.order[self.place[tile] as usize & (self.order.len() - 1)];
-            self.place[tile] = self.place[tile].wrapping_add(1);
+            self.place[tile] = match &mut self.random {
+                Some(rng) => rng.next_u32(),
+                None => self.place[tile].wrapping_add(1),
+            };
             let (x, y) = (rect.x0 + dx, rect.y0 + dy);
             if x >= rect.x1 || y >= rect.y1 {
                 continue;
