@@ -50,7 +50,7 @@ fn settings(args: &ViewArgs) -> Result<Settings, Failure> {
     let mut sampler = named.unwrap_or(default.sampler);
     match (&mut sampler, args.temporal) {
         (_, None) => {}
-        (SamplerKind::Adaptive { temporal, .. }, Some(wanted)) => *temporal = wanted,
+        (SamplerKind::Adaptive(options), Some(wanted)) => options.temporal = wanted,
         (other, Some(_)) => {
             let name = other.name();
             let error =

@@ -1,6 +1,6 @@
 //! Who competes, by name.
 
-use frameless::{ReconstructionKind, SamplerKind, Size};
+use frameless::{AdaptiveOptions, AdaptiveStage, ReconstructionKind, SamplerKind, Size};
 
 use crate::contender::{Arena, Contender};
 use crate::contenders::{
@@ -43,7 +43,8 @@ const PLAIN: [(&str, Algorithm); 7] = [
 impl Algorithm {
     /// `random`, `permutation`, `change`, `framed`, `framed-single`, `lowres60`, `lowres30`, `progressive`,
     /// `temporal`, `oracle-hold`, `adaptive`; with parameters: `change(w_d=0.7,tile=8)`, `adaptive(temporal=0.5)`, and
-    /// `adaptive` with strengths of [`frameless::Weights`]: `contrast=0.5`, `flow=0.5`, `gaze=0.5` (at the middle). After a sampler
+    /// `adaptive` with strengths of [`frameless::Weights`]: `contrast=0.5`, `flow=0.5`, `gaze=0.5` (at the middle), or without a
+    /// stage: `without=fronts`. After a sampler
     /// `+hold`, `+filter` or `+reproject` with its options, see [`ReconstructionKind::name`]; without, it is `+hold`.
     ///
     /// # Errors
@@ -151,37 +152,34 @@ fn sampler_name(kind: &SamplerKind) -> String {
         SamplerKind::Change { w_d, tile } if *kind != SamplerKind::CHANGE => {
             format!("change(w_d={w_d},tile={tile})")
         }
-        SamplerKind::Adaptive { .. } => {
-            let named = adaptive_parameters(kind)
+        SamplerKind::Adaptive(options) => {
+            let named = adaptive_parameters(options)
                 .into_iter()
-                .zip(adaptive_parameters(&SamplerKind::ADAPTIVE));
+                .zip(adaptive_parameters(&Default::default()));
             let other = named.filter(|((_, value), (_, default))| value != default);
-            let other: Vec<String> =
-                other.map(|((key, value), _)| format!("{key}={value}")).collect();
-            match other.is_empty() {
+            let strengths = other.map(|((key, value), _)| format!("{key}={value}"));
+            let without = options.without.map(|stage| format!("without={}", stage.name()));
+            let given: Vec<String> = strengths.chain(without).collect();
+            match given.is_empty() {
                 true => kind.name().into(),
-                false => format!("{}({})", kind.name(), other.join(",")),
+                false => format!("{}({})", kind.name(), given.join(",")),
             }
         }
         kind => kind.name().into(),
     }
 }
 
-/// Name and value of all parameters of `adaptive`; none of other samplers.
-fn adaptive_parameters(kind: &SamplerKind) -> Vec<(&'static str, f32)> {
-    match *kind {
-        SamplerKind::Adaptive { temporal, contrast, flow, gaze } => {
-            vec![("temporal", temporal), ("contrast", contrast), ("flow", flow), ("gaze", gaze)]
-        }
-        _ => Vec::new(),
-    }
+/// Name and value of all numbers that `adaptive` is told.
+fn adaptive_parameters(options: &AdaptiveOptions) -> [(&'static str, f32); 4] {
+    let AdaptiveOptions { temporal, contrast, flow, gaze, without: _ } = *options;
+    [("temporal", temporal), ("contrast", contrast), ("flow", flow), ("gaze", gaze)]
 }
 
 /// `text` is what stands behind the opening bracket.
 fn with_parameters(kind: SamplerKind, name: &str, text: &str) -> Result<SamplerKind, String> {
     let example = match kind {
         SamplerKind::Change { .. } => "change(w_d=0.9,tile=16)",
-        SamplerKind::Adaptive { .. } => "adaptive(temporal=0.5)",
+        SamplerKind::Adaptive { .. } => "adaptive(temporal=0.5) or adaptive(without=fronts)",
         _ => return Err(format!("algorithm {name:?}: {} has no parameters", kind.name())),
     };
     let wrong = || format!("algorithm {name:?}: wanted {example}");
@@ -196,12 +194,15 @@ fn with_parameters(kind: SamplerKind, name: &str, text: &str) -> Result<SamplerK
             (SamplerKind::Change { tile, .. }, "tile") => {
                 *tile = value.parse().map_err(|_| wrong())?
             }
-            (SamplerKind::Adaptive { temporal, contrast, flow, gaze }, key) => {
+            (SamplerKind::Adaptive(options), "without") => {
+                options.without = Some(AdaptiveStage::from_name(value).ok_or_else(wrong)?)
+            }
+            (SamplerKind::Adaptive(options), key) => {
                 let parameter = match key {
-                    "temporal" => temporal,
-                    "contrast" => contrast,
-                    "flow" => flow,
-                    "gaze" => gaze,
+                    "temporal" => &mut options.temporal,
+                    "contrast" => &mut options.contrast,
+                    "flow" => &mut options.flow,
+                    "gaze" => &mut options.gaze,
                     _ => return Err(wrong()),
                 };
                 *parameter = value.parse().map_err(|_| wrong())?
@@ -213,7 +214,7 @@ fn with_parameters(kind: SamplerKind, name: &str, text: &str) -> Result<SamplerK
         SamplerKind::Change { w_d, tile } if !(0.0..=1.0).contains(&w_d) || tile == 0 => {
             Err(format!("algorithm {name:?}: w_d must be in [0, 1] and tile at least 1"))
         }
-        SamplerKind::Adaptive { temporal, contrast, flow, gaze } => {
+        SamplerKind::Adaptive(AdaptiveOptions { temporal, contrast, flow, gaze, .. }) => {
             let is_part = [temporal, gaze].iter().all(|part| (0.0..=1.0).contains(part));
             let is_strength = [contrast, flow].iter().all(|s| (-1.0..=1.0).contains(s));
             let ranges = "temporal and gaze must be in [0, 1], contrast and flow in [-1, 1]";
@@ -243,6 +244,10 @@ mod tests {
             "adaptive+reproject+deep",
             "adaptive(temporal=0.25)+reproject+relight",
             "adaptive(contrast=-0.5,gaze=1)+reproject",
+            "adaptive(without=fronts)+reproject",
+            "adaptive(without=holes)+reproject",
+            "adaptive(without=rates)+reproject",
+            "adaptive(temporal=0.25,without=bayer)+reproject(without=aim)+deep",
         ];
         for name in plain.into_iter().chain(samplers) {
             assert_eq!(Algorithm::from_name(name).expect(name).name(), name);
@@ -268,6 +273,8 @@ mod tests {
             "adaptive(flow=NaN)",
             "adaptive(speed=1)",
             "adaptive+deep",
+            "adaptive(without=aim)",
+            "adaptive+reproject(without=rates)",
             "change(w_d",
         ] {
             let message = Algorithm::from_name(name).expect_err(name);

@@ -174,7 +174,7 @@ fn sampler_part(ui: &mut Ui, state: &mut PanelState, settings: &mut Settings) {
             let hint = format!("side of a tile in pixels; {DEFAULT_TILE} unless set");
             row(ui, "tile", &hint, Slider::new(tile, 1..=64).logarithmic(true).suffix(" px"));
         }
-        SamplerKind::Adaptive { temporal, .. } => temporal_row(ui, temporal),
+        SamplerKind::Adaptive(options) => temporal_row(ui, &mut options.temporal),
         SamplerKind::Random | SamplerKind::Permutation => {}
     }
 }

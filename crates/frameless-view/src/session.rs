@@ -3,7 +3,8 @@
 //! No thread and no window here: see `render_thread.rs`.
 
 use frameless::{
-    Clock, Display, Engine, EngineError, ReconstructionKind, SamplerKind, Size, Time, Tracer,
+    AdaptiveOptions, Clock, Display, Engine, EngineError, ReconstructionKind, SamplerKind, Size,
+    Time, Tracer,
 };
 
 use crate::command::{Command, Picture, Status, ViewChoice};
@@ -93,8 +94,10 @@ impl<S: Stage> Session<S> {
     fn set(&mut self, new: Settings) {
         let old = std::mem::replace(&mut self.settings, new);
         match (old.sampler, new.sampler) {
-            (SamplerKind::Adaptive { .. }, SamplerKind::Adaptive { temporal, .. }) => {
-                self.engine.set_temporal(temporal);
+            (SamplerKind::Adaptive(before), SamplerKind::Adaptive(now))
+                if (AdaptiveOptions { temporal: now.temporal, ..before }) == now =>
+            {
+                self.engine.set_temporal(now.temporal);
             }
             (old, new) if old == new => {}
             (_, new) => {
@@ -329,7 +332,7 @@ mod tests {
         let before = learned(&session);
         assert!(before > Some(0.0), "{before:?}");
         let sampler =
-            SamplerKind::Adaptive { temporal: 0.9, contrast: 0.0, flow: 0.0, gaze: 0.0 };
+            SamplerKind::Adaptive(AdaptiveOptions { temporal: 0.9, ..AdaptiveOptions::default() });
         session.apply(Command::Settings(Settings { sampler, ..adaptive }));
         assert_eq!(learned(&session), before);
     }

@@ -53,7 +53,10 @@ pub use time::Time;
 pub use sample::{Answer, Batch, Request, Size, Surface};
 
 pub use sampler::{Insight, Observation, Refinement, Sampler};
-pub use samplers::{Adaptive, Change, DEFAULT_TILE, DEFAULT_W_D, Permutation, Random, SamplerKind};
+pub use samplers::{
+    Adaptive, AdaptiveOptions, AdaptiveStage, Change, DEFAULT_TILE, DEFAULT_W_D, Permutation,
+    Random, SamplerKind,
+};
 pub use weights::{Gaze, WeightError, Weights};
 
 pub use lighting::{Arriving, Light, Lighting, Placement};
@@ -70,7 +73,7 @@ pub use display::Display;
 pub use rates::Rates;
 pub use reconstruction::{
     Filter, Findings, Hold, Kept, Reconstruction, ReconstructionKind, Refresh, Reproject,
-    ReprojectOptions, hold, hold_into,
+    ReprojectOptions, ReprojectStage, hold, hold_into,
 };
 
 pub use rng::Rng;

@@ -2,7 +2,10 @@
 
 mod world;
 
-use frameless::{ReconstructionKind, Time, Weights};
+use frameless::{
+    AdaptiveOptions, AdaptiveStage, ReconstructionKind, ReprojectOptions, ReprojectStage,
+    SamplerKind, Time, Weights,
+};
 use world::*;
 
 #[test]
@@ -138,5 +141,33 @@ fn the_sampler_is_told_how_tiles_move_if_it_wants_to_know() {
         for (is, per_sec) in motion.into_iter().zip(px_per_sec) {
             assert!((is - per_sec / 60.0).abs() < 1e-3, "tile {tile}: {motion:?}");
         }
+    }
+}
+
+#[test]
+fn every_stage_that_is_left_out_makes_a_difference() {
+    // Turns, approaches and stops, so that every stage has something to do.
+    let camera: Camera = |secs| {
+        let ([[a, b, c], [d, e, f]], [[zoom, ..], _]) =
+            (rotating(secs.min(0.4)), zooming(secs.min(0.4)));
+        [[zoom * a, b, c], [d, zoom * e, f]]
+    };
+    let disc = |secs: f64| [20.0 + 60.0 * secs.min(0.4) as f32, 36.0, 14.0];
+    let last = |without: Option<AdaptiveStage>, omitted: Option<ReprojectStage>| {
+        let options = ReprojectOptions { without: omitted, ..ReprojectOptions::default() };
+        let mut engine =
+            engine(world(camera, disc), ReconstructionKind::Reproject(options), 40_000.0);
+        let sampler =
+            SamplerKind::Adaptive(AdaptiveOptions { without, ..AdaptiveOptions::default() });
+        engine.set_sampler(sampler.build(1));
+        (0..30).flat_map(|_| play(&mut engine, 1).0).collect::<Vec<_>>()
+    };
+    let whole = last(None, None);
+    assert_eq!(differences(&whole, &last(None, None)), (0, 0.0));
+    for stage in AdaptiveStage::ALL {
+        assert!(differences(&whole, &last(Some(stage), None)).0 > 0, "{stage:?}");
+    }
+    for stage in ReprojectStage::ALL {
+        assert!(differences(&whole, &last(None, Some(stage))).0 > 0, "{stage:?}");
     }
 }

@@ -9,6 +9,7 @@ const ANTIALIAS: ReconstructionKind = ReconstructionKind::Reproject(ReprojectOpt
     relight: false,
     deep: false,
     antialias: true,
+    without: None,
 });
 
 const DISC: fn(f64) -> [f32; 3] = |_| [40.0, 30.0, 14.3];

@@ -7,7 +7,7 @@ mod reproject;
 
 pub use filter::Filter;
 pub use hold::{Hold, hold, hold_into};
-pub use reproject::Reproject;
+pub use reproject::{Reproject, ReprojectStage};
 
 use crate::{Canvas, Display, Lighting, Pose, Rates, Refinement, Request, Size, Surface, Time};
 
@@ -97,6 +97,8 @@ pub struct ReprojectOptions {
     pub deep: bool,
     /// Where the picture rests, jittered samples add up.
     pub antialias: bool,
+    /// What an experiment leaves out; `None`: nothing.
+    pub without: Option<ReprojectStage>,
 }
 
 /// `reproject+relight+antialias`: the best that there is, wherever the renderer tells of surfaces.
@@ -106,6 +108,7 @@ impl Default for ReconstructionKind {
             relight: true,
             deep: false,
             antialias: true,
+            without: None,
         })
     }
 }
@@ -116,10 +119,11 @@ impl ReconstructionKind {
         relight: false,
         deep: false,
         antialias: false,
+        without: None,
     });
 
-    /// The name used on the command line and in experiments: `hold`, `filter`, `reproject`, the last followed by `+relight`,
-    /// `+deep`, `+antialias` as far as they are on.
+    /// The name used on the command line and in experiments: `hold`, `filter`, `reproject`, the last with what
+    /// it leaves out (`reproject(without=aim)`) and followed by `+relight`, `+deep`, `+antialias` as far as they are on.
     pub fn name(&self) -> String {
         match self {
             ReconstructionKind::Hold => "hold".into(),
@@ -131,7 +135,11 @@ impl ReconstructionKind {
                     ("+antialias", options.antialias),
                 ];
                 let on = named.iter().filter(|(_, is_on)| *is_on).map(|(name, _)| *name);
-                std::iter::once("reproject").chain(on).collect()
+                let kind = match options.without {
+                    Some(stage) => format!("reproject(without={})", stage.name()),
+                    None => "reproject".into(),
+                };
+                std::iter::once(kind.as_str()).chain(on).collect()
             }
         }
     }
@@ -140,7 +148,11 @@ impl ReconstructionKind {
     pub fn from_name(name: &str) -> Option<ReconstructionKind> {
         let mut parts = name.split('+');
         let mut options = ReprojectOptions::default();
-        let kind = parts.next()?;
+        let mut kind = parts.next()?;
+        if let Some((head, stage)) = kind.split_once("(without=") {
+            options.without = Some(ReprojectStage::from_name(stage.strip_suffix(')')?)?);
+            kind = head;
+        }
         for part in parts {
             let option = match part {
                 "relight" => &mut options.relight,
@@ -183,10 +195,25 @@ mod tests {
             let kind = ReconstructionKind::from_name(name).expect(name);
             assert_eq!(kind.name(), name);
         }
+        for stage in ReprojectStage::ALL {
+            let name = format!("reproject(without={})+relight", stage.name());
+            let kind = ReconstructionKind::from_name(&name).expect(&name);
+            assert_eq!(kind.name(), name);
+        }
         let other_order =
             ReconstructionKind::from_name("reproject+deep+relight").expect("any order");
         assert_eq!(other_order.name(), "reproject+relight+deep");
-        for name in ["", "held", "hold+deep", "reproject+", "reproject+deep+deep", "+deep"] {
+        for name in [
+            "",
+            "held",
+            "hold+deep",
+            "reproject+",
+            "reproject+deep+deep",
+            "+deep",
+            "reproject(without=aim",
+            "reproject(without=fronts)",
+            "filter(without=aim)",
+        ] {
             assert_eq!(ReconstructionKind::from_name(name), None, "{name}");
         }
     }

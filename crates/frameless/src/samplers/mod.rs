@@ -5,8 +5,8 @@ mod change;
 mod permutation;
 mod random;
 
-pub use adaptive::Adaptive;
 pub(crate) use adaptive::DEFAULT_TEMPORAL;
+pub use adaptive::{Adaptive, AdaptiveStage};
 pub use change::{Change, DEFAULT_TILE, DEFAULT_W_D};
 pub use permutation::Permutation;
 pub use random::Random;
@@ -28,16 +28,7 @@ pub enum SamplerKind {
         tile: u32,
     },
     /// [`Adaptive`].
-    Adaptive {
-        /// Temporal against spatial accuracy, in [0, 1]; see [`Sampler::set_temporal`].
-        temporal: f32,
-        /// See [`Weights::with_contrast`]; in [−1, 1].
-        contrast: f32,
-        /// See [`Weights::with_flow`]; in [−1, 1].
-        flow: f32,
-        /// Strength of a gaze at the picture's middle with [`Gaze::RADIUS`](crate::Gaze::RADIUS); in [0, 1].
-        gaze: f32,
-    },
+    Adaptive(AdaptiveOptions),
 }
 
 /// [`SamplerKind::ADAPTIVE`].
@@ -47,13 +38,44 @@ impl Default for SamplerKind {
     }
 }
 
+/// What [`Adaptive`] is told; nothing of it makes it forget what it has learned, if it is told later.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AdaptiveOptions {
+    /// Temporal against spatial accuracy, in [0, 1]; see [`Sampler::set_temporal`].
+    pub temporal: f32,
+    /// See [`Weights::with_contrast`]; in [−1, 1].
+    pub contrast: f32,
+    /// See [`Weights::with_flow`]; in [−1, 1].
+    pub flow: f32,
+    /// Strength of a gaze at the picture's middle with [`Gaze::RADIUS`](crate::Gaze::RADIUS); in [0, 1].
+    pub gaze: f32,
+    /// What an experiment leaves out; `None`: nothing.
+    pub without: Option<AdaptiveStage>,
+}
+
+impl AdaptiveOptions {
+    /// As measured; no weights, nothing left out.
+    pub const DEFAULT: AdaptiveOptions = AdaptiveOptions {
+        temporal: DEFAULT_TEMPORAL,
+        contrast: 0.0,
+        flow: 0.0,
+        gaze: 0.0,
+        without: None,
+    };
+}
+
+impl Default for AdaptiveOptions {
+    fn default() -> AdaptiveOptions {
+        AdaptiveOptions::DEFAULT
+    }
+}
+
 impl SamplerKind {
     /// `change` with the measured defaults.
     pub const CHANGE: SamplerKind = SamplerKind::Change { w_d: DEFAULT_W_D, tile: DEFAULT_TILE };
 
     /// `adaptive` with the measured default.
-    pub const ADAPTIVE: SamplerKind =
-        SamplerKind::Adaptive { temporal: DEFAULT_TEMPORAL, contrast: 0.0, flow: 0.0, gaze: 0.0 };
+    pub const ADAPTIVE: SamplerKind = SamplerKind::Adaptive(AdaptiveOptions::DEFAULT);
 
     /// Every kind with its default parameters.
     pub const ALL: [SamplerKind; 4] =
@@ -65,7 +87,7 @@ impl SamplerKind {
             SamplerKind::Random => "random",
             SamplerKind::Permutation => "permutation",
             SamplerKind::Change { .. } => "change",
-            SamplerKind::Adaptive { .. } => "adaptive",
+            SamplerKind::Adaptive(_) => "adaptive",
         }
     }
 
@@ -80,8 +102,8 @@ impl SamplerKind {
             SamplerKind::Random => Box::new(Random::new(seed)),
             SamplerKind::Permutation => Box::new(Permutation::new(seed)),
             SamplerKind::Change { w_d, tile } => Box::new(Change::new(w_d, tile, seed)),
-            SamplerKind::Adaptive { temporal, contrast, flow, gaze } => {
-                let mut adaptive = Adaptive::new(temporal, seed);
+            SamplerKind::Adaptive(AdaptiveOptions { temporal, contrast, flow, gaze, without }) => {
+                let mut adaptive = Adaptive::new(temporal, seed).without(without);
                 adaptive.set_weights(&Weights::clamped(contrast, flow, gaze));
                 Box::new(adaptive)
             }

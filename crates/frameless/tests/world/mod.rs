@@ -187,4 +187,5 @@ pub(crate) const DEEP: ReconstructionKind = ReconstructionKind::Reproject(Reproj
     deep: true,
     relight: false,
     antialias: false,
+    without: None,
 });

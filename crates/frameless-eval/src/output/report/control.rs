@@ -1,6 +1,6 @@
 //! The control of the sampler `adaptive` that trades temporal against spatial accuracy: errors over its values.
 
-use frameless::{ReconstructionKind, SamplerKind};
+use frameless::{AdaptiveOptions, ReconstructionKind, SamplerKind};
 use maud::{Markup, html};
 
 use super::super::chart::{Chart, Series};
@@ -48,11 +48,15 @@ struct Family<'a> {
 fn families(results: &Results, rate: f64) -> Vec<Family<'_>> {
     let mut families: Vec<Family> = Vec::new();
     for run in results.runs.iter().filter(|run| run.samples_per_sec == rate) {
-        let Ok(Algorithm::Frameless(SamplerKind::Adaptive { temporal, .. }, reconstruction)) =
+        let Ok(Algorithm::Frameless(SamplerKind::Adaptive(options), reconstruction)) =
             Algorithm::from_name(&run.algorithm)
         else {
             continue;
         };
+        let temporal = options.temporal;
+        if options != (AdaptiveOptions { temporal, ..AdaptiveOptions::default() }) {
+            continue;
+        }
         let known = families.iter().position(|family| family.reconstruction == reconstruction);
         let index = known.unwrap_or_else(|| {
             families.push(Family { reconstruction, values: Vec::new() });

@@ -17,8 +17,9 @@ use crate::wide::{self, F8, M8, Planes};
 use crate::{Size, Time};
 
 /// What became of the pixels.
-#[derive(Default)]
 pub(super) struct Gather {
+    /// Whether pixels show means; else each its own best sample as it is.
+    means: bool,
     /// Per pixel when what it shows was traced; [`Time::ZERO`] if nothing is known anywhere.
     pub(super) time: Vec<Time>,
     /// Per pixel whether it has a sample of its own.
@@ -35,6 +36,17 @@ pub(super) struct Gather {
 const EXACT: f32 = 2e-5;
 
 impl Gather {
+    pub(super) fn new(means: bool) -> Gather {
+        Gather {
+            means,
+            time: Vec::new(),
+            known: Vec::new(),
+            waiting: Waiting::default(),
+            source: Vec::new(),
+            far: Vec::new(),
+        }
+    }
+
     /// `contrast` per tile of `rates`, whose tiles are eight pixels wide; `shown`: the picture if nothing is known.
     pub(super) fn run(
         &mut self,
@@ -235,7 +247,10 @@ impl Blocks<'_> {
         if holes.any() {
             seen.object = self.model.nearest(&eight, self.cells).or(holes, seen.object);
         }
-        let exact = seen.error.less_than(F8::splat(EXACT));
+        let exact = match self.gather.means {
+            true => seen.error.less_than(F8::splat(EXACT)),
+            false => holes.not(),
+        };
         if !exact.either(seen.object.equals(empty)).all() {
             let mean = self.model.mean(&eight, self.cells, seen.object, holes);
             seen.rgb = [0, 1, 2].map(|k| seen.rgb[k].or(exact, mean[k]));

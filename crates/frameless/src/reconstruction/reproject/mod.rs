@@ -13,6 +13,7 @@ mod packed;
 mod relight;
 mod residual;
 mod settle;
+mod stage;
 mod store;
 mod warp;
 
@@ -23,6 +24,7 @@ use crate::tile::TileGrid;
 use crate::{
     Canvas, Display, Findings, Kept, Pose, Reconstruction, Refinement, Refresh, Request, Size, Time,
 };
+pub use stage::ReprojectStage;
 use store::{Store, Tick};
 
 /// See the module.
@@ -58,7 +60,7 @@ impl Reproject {
             cells,
             store: Store::new(Size::new(1, 1), cells),
             warp: Default::default(),
-            gather: Default::default(),
+            gather: gather::Gather::new(options.without != Some(ReprojectStage::Gather)),
             relight: Default::default(),
             settled: Default::default(),
             shown: Vec::new(),
@@ -125,7 +127,8 @@ impl Reconstruction for Reproject {
     }
 
     fn aim(&self, now: Time, canvas: &Canvas, requests: &mut [Request]) {
-        if self.refreshes >= 2 && self.store.layout.size == canvas.size() {
+        let is_out = self.options.without == Some(ReprojectStage::Aim);
+        if self.refreshes >= 2 && self.store.layout.size == canvas.size() && !is_out {
             // Those that add to a pixel's samples lie where they are to lie.
             for request in requests.iter_mut().filter(|request| request.sample_index == 0) {
                 self.aim_one(now, request);
@@ -157,6 +160,9 @@ impl Reconstruction for Reproject {
         }
         if !at_rest {
             self.warp.run(&mut self.store, &self.poses[0]);
+            if self.options.without != Some(ReprojectStage::Cracks) {
+                self.warp.remove_seen_through_cracks(&mut self.store);
+            }
         }
         let display = *refresh.display;
         if std::mem::replace(&mut self.display, display) != display {
@@ -175,7 +181,8 @@ impl Reconstruction for Reproject {
         tile_contrast(&self.shown, &rates.grid, &mut self.contrast);
         self.gather.run(&self.store, refresh.now, rates, &self.contrast, &self.shown, picture);
         self.relight.find_shadow_edges(&self.store, &mut self.gather.waiting);
-        if self.settled.any_rests() {
+        let recentres = self.options.without != Some(ReprojectStage::Recentre);
+        if recentres && self.settled.any_rests() {
             self.gather.find_off_centre(&self.store, |object| self.settled.rests(object));
         }
         let wanted = match refresh.is_noisy {

@@ -4,8 +4,8 @@
 //! nearest pixel and against the bilinear interpolation. For a moving one it is the distance to the range of the 3×3 colours
 //! there, plus a tenth of that: resampling a texture at other places is not change.
 
-use super::Reproject;
 use super::store::{SCREEN, Sample};
+use super::{Reproject, ReprojectStage};
 use crate::{Display, Kept, Request};
 
 /// What a sample found.
@@ -81,7 +81,8 @@ impl Reproject {
         };
         let raw = squared(rgb, self.nearest(px)).min(squared(rgb, self.bilinear(px)));
         let outdated = raw > 3.0 * OUTDATED;
-        let moving = self.refreshes >= 2
+        let moving = self.options.without != Some(ReprojectStage::Range)
+            && self.refreshes >= 2
             && self.poses[1].project(&surface).is_some_and(|before| {
                 let [dx, dy] = [before.px[0] - px[0], before.px[1] - px[1]];
                 dx * dx + dy * dy > AT_REST_PX * AT_REST_PX

@@ -45,7 +45,6 @@ impl Warp {
         self.settle(store);
         self.rebuild(store);
         self.step_aside(store);
-        self.remove_seen_through_cracks(store);
     }
 
     /// Where every sample's surface is now.
@@ -82,7 +81,8 @@ impl Warp {
         wide::run(StepAside { old, carried, losers, moves, store });
     }
 
-    fn remove_seen_through_cracks(&mut self, store: &mut Store) {
+    /// After [`Warp::run`]: what is seen between a nearer object's samples.
+    pub(super) fn remove_seen_through_cracks(&mut self, store: &mut Store) {
         self.covered.clear();
         wide::run(Cracks { store, covered: &mut self.covered });
         for &i in &self.covered {

@@ -9,6 +9,7 @@
 //! off by v / 2f on average, and Σ v_i / f_i at given Σ f_i is least for f_i ∝ √v_i. m_i is how much the tile counts
 //! ([`weights`](super::weights)); the even part is not weighted.
 
+use super::AdaptiveStage;
 use crate::bayer;
 use crate::rates::Rates;
 use crate::{Canvas, Rng, Time, wide};
@@ -29,15 +30,10 @@ pub(crate) struct Credit {
     rich: Vec<u32>,
     /// Pixels of a tile in their order, relative to its corner.
     order: Vec<(u32, u32)>,
-}
-
-/// The part of the samples that each tile gets, of those that holes and fronts leave.
-pub(crate) fn shares(rates: &[f32], weights: &[f32]) -> Vec<f32> {
-    let mut shares = vec![0.0; rates.len()];
-    weigh(rates, weights, &mut shares);
-    let (sum, evenly): (f32, f32) = (shares.iter().sum(), EVENLY / rates.len() as f32);
-    shares.iter_mut().for_each(|share| *share = (1.0 - EVENLY) * *share / sum + evenly);
-    shares
+    /// Draws places instead of the order, if that is left out.
+    random: Option<Rng>,
+    /// Whether all tiles weigh the same.
+    evenly: bool,
 }
 
 /// m √v of every tile; without `weights` all m are 1.
@@ -52,14 +48,37 @@ fn weigh(rates: &[f32], weights: &[f32], weighed: &mut [f32]) {
 }
 
 impl Credit {
-    pub(crate) fn new(tiles: usize, side_bits: u32, rng: &mut Rng) -> Credit {
+    pub(crate) fn new(
+        tiles: usize,
+        side_bits: u32,
+        without: Option<AdaptiveStage>,
+        rng: &mut Rng,
+    ) -> Credit {
         Credit {
             credit: (0..tiles).map(|_| rng.unit_f32()).collect(),
             place: (0..tiles).map(|_| rng.next_u32()).collect(),
             weight: vec![0.0; tiles],
             rich: Vec::new(),
             order: bayer::order(side_bits),
+            random: (without == Some(AdaptiveStage::Bayer))
+                .then(|| Rng::new(u64::from(rng.next_u32()))),
+            evenly: without == Some(AdaptiveStage::Rates),
         }
+    }
+
+    /// The part of the samples that each tile gets, of those that holes and fronts leave.
+    pub(crate) fn shares(&self, rates: &[f32], weights: &[f32]) -> Vec<f32> {
+        let evenly = 1.0 / rates.len() as f32;
+        if self.evenly {
+            return vec![evenly; rates.len()];
+        }
+        let mut shares = vec![0.0; rates.len()];
+        weigh(rates, weights, &mut shares);
+        let sum: f32 = shares.iter().sum();
+        shares
+            .iter_mut()
+            .for_each(|share| *share = (1.0 - EVENLY) * *share / sum + EVENLY * evenly);
+        shares
     }
 
     /// Gives out about `count` samples; exactly on average.
@@ -73,6 +92,9 @@ impl Credit {
     ) {
         let tiles = self.credit.len();
         weigh(rates.all(), weights, &mut self.weight);
+        if self.evenly {
+            self.weight.fill(1.0);
+        }
         let sum: f32 = self.weight.iter().sum();
         let (per_weight, evenly) = ((1.0 - EVENLY) * count / sum, EVENLY * count / tiles as f32);
         for (credit, weight) in self.credit.iter_mut().zip(&self.weight) {
@@ -109,7 +131,10 @@ impl Credit {
         while tries < TRIES {
             // As many as a power of two.
             let (dx, dy) = self.order[self.place[tile] as usize & (self.order.len() - 1)];
-            self.place[tile] = self.place[tile].wrapping_add(1);
+            self.place[tile] = match &mut self.random {
+                Some(rng) => rng.next_u32(),
+                None => self.place[tile].wrapping_add(1),
+            };
             let (x, y) = (rect.x0 + dx, rect.y0 + dy);
             if x >= rect.x1 || y >= rect.y1 {
                 continue;

@@ -15,6 +15,7 @@ mod credit;
 mod flow;
 mod front;
 mod refine;
+mod stage;
 mod weights;
 
 use std::collections::VecDeque;
@@ -25,6 +26,7 @@ use crate::{Canvas, Insight, Observation, Request, Rng, Sampler, Time, Weights};
 use credit::Credit;
 use front::Front;
 use refine::Refine;
+pub use stage::AdaptiveStage;
 use weights::TileWeights;
 
 /// Side of a tile, as a power of two: 8 pixels.
@@ -45,6 +47,7 @@ pub(crate) const DEFAULT_TEMPORAL: f32 = 0.5;
 pub struct Adaptive {
     temporal: f32,
     weights: Weights,
+    without: Option<AdaptiveStage>,
     rng: Rng,
     state: Option<State>,
 }
@@ -78,17 +81,27 @@ enum Why {
 impl Adaptive {
     /// `temporal` in [0, 1]: see [`Sampler::set_temporal`]. The same seed makes the same choices.
     pub fn new(temporal: f32, seed: u64) -> Adaptive {
-        let temporal = temporal.clamp(0.0, 1.0);
-        Adaptive { temporal, weights: Weights::default(), rng: Rng::new(seed), state: None }
+        let (temporal, rng) = (temporal.clamp(0.0, 1.0), Rng::new(seed));
+        Adaptive { temporal, weights: Weights::default(), without: None, rng, state: None }
+    }
+
+    /// The same with one stage left out, for experiments; `None`: with all of them.
+    pub fn without(self, stage: Option<AdaptiveStage>) -> Adaptive {
+        Adaptive { without: stage, ..self }
     }
 }
 
 impl State {
-    fn new(canvas: &Canvas, weights: &Weights, rng: &mut Rng) -> State {
+    fn new(
+        canvas: &Canvas,
+        weights: &Weights,
+        without: Option<AdaptiveStage>,
+        rng: &mut Rng,
+    ) -> State {
         let grid = TileGrid::new(canvas.size(), 1 << TILE_BITS);
         State {
             generation: canvas.generation(),
-            credit: Credit::new(grid.len(), TILE_BITS, rng),
+            credit: Credit::new(grid.len(), TILE_BITS, without, rng),
             refine: Refine::new(&grid, TILE_BITS, rng),
             weights: TileWeights::new(weights, &grid),
             rates: Rates::new(grid),
@@ -158,7 +171,8 @@ impl Sampler for Adaptive {
         if self.state.as_ref().is_some_and(|state| state.generation != canvas.generation()) {
             self.state = None;
         }
-        let new = || State::new(canvas, &self.weights, &mut self.rng);
+        let without = self.without;
+        let new = || State::new(canvas, &self.weights, without, &mut self.rng);
         let state = self.state.get_or_insert_with(new);
         let start = requests.len();
         if state.updates != canvas.updates() {
@@ -170,8 +184,13 @@ impl Sampler for Adaptive {
         }
         let unknown = canvas.holes().len() as f32 / canvas.size().pixels() as f32;
         let hole_share = HOLE_SHARE.max(unknown);
-        state.choose_holes(canvas, (hole_share * count as f32) as usize, requests);
-        state.choose_fronts(canvas, count - (requests.len() - start), self.temporal, requests);
+        if without != Some(AdaptiveStage::Holes) {
+            state.choose_holes(canvas, (hole_share * count as f32) as usize, requests);
+        }
+        if without != Some(AdaptiveStage::Fronts) {
+            let rest = count - (requests.len() - start);
+            state.choose_fronts(canvas, rest, self.temporal, requests);
+        }
         let State { credit, refine, weights, rates, why, owed, .. } = state;
         let weights = weights.all();
         let left = (count - (requests.len() - start)) as f32;
@@ -243,7 +262,7 @@ impl Sampler for Adaptive {
     fn inspect(&self, _now: Time, canvas: &Canvas) -> Insight {
         let of = |state: &&State| state.generation == canvas.generation();
         let Some(state) = self.state.as_ref().filter(of) else { return Insight::default() };
-        let tiles = credit::shares(state.rates.all(), state.weights.all());
+        let tiles = state.credit.shares(state.rates.all(), state.weights.all());
         let grid = &state.rates.grid;
         let pixels = 0..canvas.size().pixels() as u32;
         let tile_probability: Vec<f32> = pixels.map(|p| tiles[grid.tile_of(p)]).collect();
@@ -274,6 +293,30 @@ mod tests {
             choose(&mut Adaptive::new(DEFAULT_TEMPORAL, 1), &canvas, 4),
             [645, 1986, 1638, 2459]
         );
+    }
+
+    #[test]
+    fn without_rates_all_tiles_share_alike() {
+        let size = Size::new(64, 64);
+        let mut canvas = Canvas::from_picture(size, vec![[0.0; 3]; size.pixels()]);
+        let mut counts = vec![0u32; 64];
+        let mut sampler = Adaptive::new(DEFAULT_TEMPORAL, 3).without(Some(AdaptiveStage::Rates));
+        for turn in 1..65u64 {
+            let now = Time(turn * 1_000_000);
+            let mut requests = Vec::new();
+            sampler.choose(now, &canvas, 100, &mut requests);
+            let observe = |request: &Request| {
+                let pixel = request.pixel;
+                let tile = TileGrid::new(size, 8).tile_of(pixel);
+                counts[tile] += 1;
+                let (previous, _) = canvas.replace(pixel, now, [0.0; 3]);
+                let change = if tile == 0 { 0.002 } else { 0.0 };
+                Observation { pixel, now, previous, known: true, change, refinement: None }
+            };
+            let observations: Vec<Observation> = requests.iter().map(observe).collect();
+            sampler.observe(&canvas, &observations);
+        }
+        assert!(counts.iter().all(|count| count.abs_diff(100) <= 1), "{counts:?}");
     }
 
     #[test]
