@@ -171,3 +171,41 @@ fn every_stage_that_is_left_out_makes_a_difference() {
         assert!(differences(&whole, &last(None, Some(stage))).0 > 0, "{stage:?}");
     }
 }
+
+#[test]
+fn a_lamp_that_changes_shows_at_the_next_refresh() {
+    // Dims at 0.3 s, then flickers.
+    let lamp = |secs: f64| match secs {
+        s if s < 0.3 => 1.0,
+        s if s < 0.4 => 0.3,
+        s => 0.6 + 0.3 * (40.0 * s).sin() as f32,
+    };
+    for (camera, of_motion) in [(STILL, 0.0), (translating as Camera, 0.06)] {
+        let world = World { lamp, ..world(camera, |_| [48.0, 36.0, 20.0]) };
+        let errors = [true, false].map(|relight| {
+            let options = ReprojectOptions { relight, ..ReprojectOptions::default() };
+            let kind = ReconstructionKind::Reproject(options);
+            let mut engine = engine(world, kind, 60_000.0);
+            play(&mut engine, 18);
+            let mut worst = 0.0f32;
+            for _ in 0..20 {
+                let (picture, secs) = play(&mut engine, 1);
+                worst = worst.max(rmse(&picture, &world.ideal(secs)));
+            }
+            worst
+        });
+        let [with, without] = errors;
+        // What is left is of the motion alone.
+        assert!(with < of_motion + 0.001, "{with}");
+        assert!(without > 0.1, "{without}");
+    }
+}
+
+#[test]
+fn a_lamp_that_stays_changes_nothing() {
+    let world = world(STILL, |_| [48.0, 36.0, 20.0]);
+    let options = ReprojectOptions { relight: true, ..ReprojectOptions::default() };
+    let mut engine = engine(world, ReconstructionKind::Reproject(options), 83_000.0);
+    let (picture, secs) = play(&mut engine, 40);
+    assert_eq!(differences(&picture, &world.ideal(secs)), (0, 0.0));
+}

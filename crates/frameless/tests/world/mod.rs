@@ -4,8 +4,8 @@
 #![allow(dead_code)]
 
 use frameless::{
-    Answer, Batch, Canvas, Clock, Engine, Pose, Projection, ReconstructionKind, ReprojectOptions,
-    Request, SamplerKind, Size, Surface, Time, Tracer,
+    Answer, Batch, Canvas, Clock, Engine, Light, Lighting, Placement, Pose, Projection,
+    ReconstructionKind, ReprojectOptions, Request, SamplerKind, Size, Surface, Time, Tracer,
 };
 
 pub(crate) const SIZE: Size = Size { width: 96, height: 72 };
@@ -22,6 +22,8 @@ pub(crate) struct World {
     pub(crate) surfaces: fn(u32) -> bool,
     /// What part of the light reaches a point (x, y) of the plane at a time.
     pub(crate) light: fn(f64, [f32; 2]) -> f32,
+    /// How brightly the one lamp shines, from straight above, at a time.
+    pub(crate) lamp: fn(f64) -> f32,
     /// Colours are multiplied by 1 ± this, at random; 0: no noise.
     pub(crate) noise: f32,
 }
@@ -64,21 +66,11 @@ impl World {
             let lit = texture * (self.light)(secs, [x, y]);
             (0, [x, y, 0.0], [0.0, lit, 0.5 * lit])
         };
+        let (albedo, lamp) = (rgb, (self.lamp)(secs));
         let noise = 1.0 + self.noise * random(request);
-        let rgb = rgb.map(|c: f32| c * noise);
+        let rgb = rgb.map(|c: f32| c * noise * lamp);
         let normal = [0.0, 0.0, 1.0];
-        (
-            rgb,
-            Surface {
-                object,
-                primitive: 0,
-                position,
-                normal,
-                albedo: rgb,
-                direct: [0.0; 3],
-                lit: 1,
-            },
-        )
+        (rgb, Surface { object, primitive: 0, position, normal, albedo, direct: rgb, lit: 1 })
     }
 
     pub(crate) fn pose(&self, secs: f64) -> Pose {
@@ -125,6 +117,19 @@ impl Tracer for Renderer {
         self.world.noise > 0.0
     }
 
+    fn lighting(&mut self, scene_secs: f64, lighting: &mut Lighting) -> bool {
+        let intensity = [(self.world.lamp)(scene_secs) * std::f32::consts::PI; 3];
+        let backwards = [0.0, 0.0, 1.0];
+        let range = f32::INFINITY;
+        let lamp = Light { position: None, backwards, intensity, range, cone: None };
+        let as_it_is = Placement {
+            point: [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
+            normal: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        };
+        *lighting = Lighting { lights: vec![lamp], world_from_object: vec![Some(as_it_is); 2] };
+        true
+    }
+
     fn pose(&mut self, scene_secs: f64, _size: Size, pose: &mut Pose) -> bool {
         *pose = self.world.pose(scene_secs);
         true
@@ -132,7 +137,7 @@ impl Tracer for Renderer {
 }
 
 pub(crate) fn world(camera: Camera, disc: fn(f64) -> [f32; 3]) -> World {
-    World { camera, disc, surfaces: |_| true, light: |_, _| 1.0, noise: 0.0 }
+    World { camera, disc, surfaces: |_| true, light: |_, _| 1.0, lamp: |_| 1.0, noise: 0.0 }
 }
 
 /// In [−1, 1), from the pixel and the sample's number.
