@@ -1,0 +1,165 @@
+//! Samples of the real tracer, carried along: what `pose` says against what the tracer's own rays hit, and pictures made of it.
+
+use std::sync::Arc;
+
+use frameless::{
+    Clock, Display, Engine, Pose, ReconstructionKind, Request, Rng, SamplerKind, Size, Surface,
+    Time,
+};
+use frameless_scene::{Projection, Scene, View, builtin};
+use frameless_trace::{CpuTracer, Settings, ViewSource, World, render, thread_pool};
+use glam::{Affine3A, Vec3};
+
+const SIZE: Size = Size { width: 96, height: 72 };
+
+fn world(name: &str) -> Arc<World> {
+    Arc::new(World::new(Arc::new(builtin(name).expect("a built-in scene"))))
+}
+
+fn request_at(size: Size, [x, y]: [f32; 2]) -> Option<Request> {
+    let inside = x >= 0.0 && y >= 0.0 && x < size.width as f32 && y < size.height as f32;
+    let offset = [x - x.floor() - 0.5, y - y.floor() - 0.5];
+    inside.then(|| Request { pixel: size.index(x as u32, y as u32), offset, sample_index: 0 })
+}
+
+/// How many of `tries` random samples at `then_secs` are seen again at `now_secs`; panics if one is neither seen nor covered.
+fn seen_again(name: &str, [then_secs, now_secs]: [f64; 2], tries: u32) -> u32 {
+    let size = Size::new(512, 384);
+    let world = world(name);
+    let [then, now] = [then_secs, now_secs].map(|secs| world.moment(secs));
+    let [view_then, view_now] = [&then, &now].map(|m| world.scene().view_at(m.state(), 0));
+    let mut pose = Pose::default();
+    now.pose(&view_now, size, &mut pose);
+    let mut rng = Rng::new(7);
+    let mut seen = 0;
+    for _ in 0..tries {
+        let pixel = rng.below(size.pixels() as u32);
+        let offset = [rng.unit_f32() - 0.5, rng.unit_f32() - 0.5];
+        let request = Request { pixel, offset, sample_index: 0 };
+        let (_, before) = world.trace(&then, &view_then, size, &request, &Settings::default());
+        let Some(there) = pose.project(&before) else { continue };
+        let Some(request) = request_at(size, there.px) else { continue };
+        let (_, after) = world.trace(&now, &view_now, size, &request, &Settings::default());
+        let off = (0..3).map(|k| (after.position[k] - before.position[k]).abs());
+        if after.object == before.object && off.fold(0.0, f32::max) < 1e-3 {
+            seen += 1;
+            continue;
+        }
+        let depth = pose.project(&after).map_or(0.0, |hit| hit.depth);
+        assert!(
+            depth < there.depth * (1.0 - 1e-4),
+            "{name}: {before:?} should be at {there:?}, where there is {after:?} at {depth}"
+        );
+    }
+    seen
+}
+
+#[test]
+fn what_was_hit_is_hit_again_where_it_is_said_to_be() {
+    // Nothing moves; a sphere rolls; spheres and boxes fly and spin; the camera goes round; all of that.
+    assert!(seen_again("sphere", [0.4, 0.4], 2000) > 1990);
+    for name in ["sphere", "many", "orbit", "mix"] {
+        let seen = seen_again(name, [0.4, 0.45], 2000);
+        assert!(seen > 1700, "{name}: {seen} of 2000");
+    }
+}
+
+fn view(position: Vec3, yaw_rad: f32) -> View {
+    let turned = Affine3A::from_rotation_y(yaw_rad);
+    View {
+        world_from_camera: Affine3A::from_translation(position) * turned,
+        projection: Projection::Perspective { yfov_rad: 0.9 },
+    }
+}
+
+fn engine(world: &Arc<World>, view: View, samples_per_sec: f64) -> Engine<CpuTracer> {
+    let tracer = CpuTracer::new(world.clone(), ViewSource::Free(view), Settings::default(), 1);
+    let (clock, sampler) = (Clock::simulated(samples_per_sec), SamplerKind::ADAPTIVE.build(1));
+    let mut engine = Engine::new(SIZE, clock, sampler, tracer);
+    engine.set_reconstruction(ReconstructionKind::REPROJECT.build());
+    engine
+}
+
+/// The picture at refresh `k`, seen from `view` since the one before.
+fn play(engine: &mut Engine<CpuTracer>, k: u64, view: View) -> Vec<[f32; 3]> {
+    let time = Time(k * 1_000_000_000 / 60);
+    engine.tracer_mut().set_view(ViewSource::Free(view));
+    engine.run_until(time).expect("finite colours");
+    engine.refresh(time).to_vec()
+}
+
+fn ideal(world: &World, view: View, secs: f64) -> Vec<[f32; 3]> {
+    let pool = thread_pool(1);
+    let linear = render(world, secs, &ViewSource::Free(view), SIZE, &Settings::default(), &pool);
+    linear.into_iter().map(|rgb| Display::default().encode(rgb)).collect()
+}
+
+fn rmse(a: &[[f32; 3]], b: &[[f32; 3]]) -> f32 {
+    let squares = a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).powi(2));
+    (squares.sum::<f32>() / (3 * a.len()) as f32).sqrt()
+}
+
+#[test]
+fn objects_may_come_through_the_camera() {
+    // Through the scene from front to back, within blocks and spheres on the way.
+    let world = world("orbit");
+    let at = |k: u64| view(Vec3::new(0.3, 0.8, 9.0 - 0.4 * k.min(40) as f32), 0.0);
+    let mut engine = engine(&world, at(0), 80_000.0);
+    let mut picture = Vec::new();
+    for k in 1..=40 + 40 {
+        picture = play(&mut engine, k, at(k));
+        assert!(picture.iter().flatten().all(|c| (0.0..=1.0).contains(c)), "refresh {k}");
+    }
+    assert!(engine.canvas().holes().is_empty(), "{} wait", engine.canvas().holes().len());
+    // The scene itself is at rest.
+    assert_eq!(rmse(&picture, &ideal(&world, at(40), 80.0 / 60.0)), 0.0);
+}
+
+#[test]
+fn what_is_behind_the_camera_has_no_place_in_the_picture() {
+    let world = world("orbit");
+    let (moment, mut pose) = (world.moment(0.0), Pose::default());
+    let (here, beyond) =
+        (view(Vec3::new(0.0, 1.0, 9.0), 0.0), view(Vec3::new(0.0, 1.0, -9.0), 0.0));
+    moment.pose(&beyond, SIZE, &mut pose);
+    for x in 0..SIZE.width {
+        let request = Request::centre(SIZE.index(x, SIZE.height * 3 / 4));
+        let (_, floor) = world.trace(&moment, &here, SIZE, &request, &Settings::default());
+        assert_ne!(floor.object, Surface::SKY);
+        assert_eq!(pose.project(&floor), None);
+    }
+}
+
+#[test]
+fn a_sky_without_objects_follows_the_camera() {
+    let sky = [Vec3::new(0.1, 0.1, 0.3), Vec3::new(0.9, 0.5, 0.2)];
+    let world = Arc::new(World::new(Arc::new(Scene { sky, ..Scene::default() })));
+    let at = |k: u64| {
+        let turn = 0.03 * k.min(40) as f32;
+        let View { world_from_camera, projection } = view(Vec3::ZERO, turn);
+        View { world_from_camera: world_from_camera * Affine3A::from_rotation_x(turn), projection }
+    };
+    let mut engine = engine(&world, at(0), 80_000.0);
+    for k in 1..=40 + 30 {
+        let picture = play(&mut engine, k, at(k));
+        let error = rmse(&picture, &ideal(&world, at(k), 0.0));
+        assert!(k < 10 || error < 0.01, "refresh {k}: {error}");
+        assert!(k < 70 || error == 0.0, "at rest: {error}");
+    }
+    assert!(engine.canvas().holes().is_empty(), "{} wait", engine.canvas().holes().len());
+}
+
+#[test]
+fn batches_of_one_sample_and_of_a_million() {
+    let world = world("sphere");
+    let size = Size::new(8, 6);
+    for batch in [1, 1_000_000] {
+        let tracer = CpuTracer::new(world.clone(), ViewSource::Camera(0), Settings::default(), 1);
+        let clock = Clock::simulated(f64::from(batch) * f64::from(frameless::BATCHES_PER_SEC));
+        let mut engine = Engine::new(size, clock, SamplerKind::ADAPTIVE.build(1), tracer);
+        engine.set_reconstruction(ReconstructionKind::REPROJECT.build());
+        assert_eq!(engine.step().expect("finite colours"), batch as usize);
+        let picture = engine.refresh(Time::from_secs(1.0 / 60.0));
+        assert!(picture.iter().flatten().all(|c| (0.0..=1.0).contains(c)));
+    }
+}
