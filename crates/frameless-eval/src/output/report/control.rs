@@ -38,6 +38,9 @@ pub(super) fn section(results: &Results) -> Markup {
     }
 }
 
+/// A number of a run, if it has it.
+type Measure = fn(&RunResult) -> Option<f64>;
+
 /// Runs that differ only in the control's value, the scene, and the seed.
 struct Family<'a> {
     reconstruction: ReconstructionKind,
@@ -76,7 +79,7 @@ fn families(results: &Results, rate: f64) -> Vec<Family<'_>> {
 }
 
 fn figure(family: &Family, rate: f64) -> Markup {
-    let curve = |(index, (name, of)): (usize, (&str, fn(&RunResult) -> Option<f64>))| {
+    let curve = |(index, (name, of)): (usize, (&str, Measure))| {
         let point = |(value, runs): &(f32, Vec<&RunResult>)| {
             let errors: Vec<f64> = runs.iter().filter_map(|run| of(run)).collect();
             let mean = errors.iter().sum::<f64>() / errors.len() as f64;
@@ -86,7 +89,7 @@ fn figure(family: &Family, rate: f64) -> Markup {
         let mean = points.iter().map(|(_, error)| error).sum::<f64>() / points.len().max(1) as f64;
         Series { name: name.to_owned(), index, points, mean }
     };
-    let errors: [(&str, fn(&RunResult) -> Option<f64>); 2] =
+    let errors: [(&str, Measure); 2] =
         [("temporal", |run| run.rmse_changed.mean), ("spatial", just_stopped)];
     let chart = Chart {
         y_label: format!(
