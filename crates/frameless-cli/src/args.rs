@@ -93,7 +93,7 @@ pub(crate) struct ViewArgs {
     #[arg(long, value_name = "0..1", value_parser = parse::fraction)]
     pub(crate) temporal: Option<f32>,
 
-    /// Trace a picture of always the same size in pixels, whatever the window's [default: as the window]
+    /// Trace a picture of always the same size in pixels, whatever the window's [default: as the window, at most 640x480]
     #[arg(long, value_name = "WxH", value_parser = parse::size)]
     pub(crate) size: Option<Size>,
 

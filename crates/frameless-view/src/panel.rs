@@ -280,15 +280,12 @@ fn picture_part(ui: &mut Ui, settings: &mut Settings) {
     row(ui, "exposure", "in stops: brighter by this power of two", slider);
     let fixed = [(320, 240), (512, 384), (640, 480), (1024, 768), (1280, 720), (1920, 1080)];
     let fixed = fixed.map(|(width, height)| PictureSize::Fixed(Size::new(width, height)));
-    let window = match settings.picture {
-        window @ PictureSize::Window { .. } => window,
-        PictureSize::Fixed(_) => PictureSize::default(),
-    };
     ComboBox::from_id_salt("size")
         .selected_text(size_name(settings.picture))
         .width(ui.available_width())
         .show_ui(ui, |ui| {
-            for size in std::iter::once(window).chain(fixed) {
+            for size in [PictureSize::default(), PictureSize::WHOLE_WINDOW].into_iter().chain(fixed)
+            {
                 ui.selectable_value(&mut settings.picture, size, size_name(size));
             }
         });
@@ -296,7 +293,8 @@ fn picture_part(ui: &mut Ui, settings: &mut Settings) {
 
 fn size_name(size: PictureSize) -> String {
     match size {
-        PictureSize::Window { .. } => "as large as the window".to_owned(),
+        PictureSize::WHOLE_WINDOW => "every pixel of the window".to_owned(),
+        PictureSize::Window { .. } => "as the window, coarser if it is large".to_owned(),
         PictureSize::Fixed(Size { width, height }) => format!("{width} × {height}"),
     }
 }

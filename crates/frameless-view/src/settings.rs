@@ -117,9 +117,9 @@ pub enum PictureSize {
 }
 
 impl Default for PictureSize {
-    /// The window, up to Full HD.
+    /// The window, with at most 640×480 pixels: as many as one thread can carry along several times a second.
     fn default() -> Self {
-        PictureSize::Window { at_most: 1920 * 1080 }
+        PictureSize::Window { at_most: 640 * 480 }
     }
 }
 
@@ -127,6 +127,9 @@ impl Default for PictureSize {
 const SMALLEST_SIDE: u32 = 16;
 
 impl PictureSize {
+    /// The window, up to Full HD.
+    pub const WHOLE_WINDOW: PictureSize = PictureSize::Window { at_most: 1920 * 1080 };
+
     /// The picture's size for a place of `place_px` physical pixels.
     pub(crate) fn size_in(self, place_px: [u32; 2]) -> Size {
         let [width, height] = place_px.map(|side| side.max(SMALLEST_SIDE));
