@@ -162,7 +162,7 @@ impl Shared {
         settings: &Settings,
     ) {
         let Workspace { moment, order, samples } = workspace;
-        samples.resize(order.len(), ([0.0; 3], UNTRACED));
+        samples.resize(order.len(), ([0.0; 3], Surface::default()));
         let chunks = order.par_chunks(CHUNK).zip(samples.par_chunks_mut(CHUNK));
         chunks.for_each_init(Stack::new, |stack, (order, samples)| {
             for (&request, sample) in order.iter().zip(samples) {
@@ -185,22 +185,12 @@ impl Shared {
     }
 }
 
-const UNTRACED: Surface = Surface {
-    object: Surface::SKY,
-    primitive: 0,
-    position: [0.0; 3],
-    normal: [0.0; 3],
-    albedo: [0.0; 3],
-    direct: [0.0; 3],
-    lit: 0,
-};
-
 impl Workspace {
     fn in_order_of_requests(&self, settings: &Settings) -> (Vec<[f32; 3]>, Vec<Surface>) {
         let mut rgb = vec![[0.0; 3]; self.samples.len()];
         let mut surfaces = Vec::new();
         if settings.surfaces {
-            surfaces.resize(self.samples.len(), UNTRACED);
+            surfaces.resize(self.samples.len(), Surface::default());
         }
         for (&request, &(colour, surface)) in self.order.iter().zip(&self.samples) {
             rgb[request as usize] = colour;

@@ -182,15 +182,7 @@ mod tests {
 
     #[test]
     fn surfaces_of_a_scene_that_is_gone_are_left_out() {
-        let nothing = Surface {
-            object: Surface::SKY,
-            primitive: 0,
-            position: [0.0; 3],
-            normal: [0.0; 3],
-            albedo: [0.0; 3],
-            direct: [0.0; 3],
-            lit: 0,
-        };
+        let nothing = Surface { object: Surface::SKY, ..Surface::default() };
         let mut counted = Counted::new(Sky(nothing, Vec::new()));
         let batch = |id| {
             let (requests, size) = (vec![Request::centre(0)], Size::new(1, 1));

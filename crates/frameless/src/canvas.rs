@@ -1,5 +1,6 @@
 //! The samples kept: the newest of every pixel.
 
+use crate::wide;
 use crate::{Size, Time};
 
 /// The newest sample of every pixel: its linear colour and its time.
@@ -153,6 +154,16 @@ impl Canvas {
         contrast.clone_into(&mut self.tile_contrast);
         self.tile_motion.clear();
         self.tile_motion.extend(motion);
+    }
+
+    /// Begins to fetch what is known of a pixel.
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, pixel: u32) {
+        let i = pixel as usize;
+        wide::prefetch(&self.rgb, i);
+        wide::prefetch(&self.time, i);
+        wide::prefetch(&self.known, i);
+        wide::prefetch(&self.samples, i);
     }
 
     /// A sample has been added to those of a pixel at rest; returns the time and colour of the one at its centre, which stays.

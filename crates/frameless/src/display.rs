@@ -76,8 +76,9 @@ impl Display {
         difference * difference
     }
 
+    /// [`Display::encode`] of one channel.
     #[inline(always)]
-    fn encode_channel(&self, linear: f32) -> f32 {
+    pub(crate) fn encode_channel(&self, linear: f32) -> f32 {
         srgb_from_linear(linear * self.gain)
     }
 }

@@ -94,6 +94,9 @@ pub enum EngineError {
     },
 }
 
+/// So many samples later what is prefetched is used.
+const AHEAD: usize = 16;
+
 /// Batches under way at once on the real clock: while one is traced the next is chosen.
 const PIPELINE_DEPTH: usize = 2;
 
@@ -233,8 +236,8 @@ impl<T: Tracer> Engine<T> {
 
     /// Writes an answer to the canvas and notes what each sample replaced.
     ///
-    /// Only memory is moved here, in a loop so short that many pixels are fetched at once; what the samples
-    /// changed is worked out afterwards from `replaced`, which lies in the cache.
+    /// Only memory is moved here, and fetched some samples ahead; what the samples changed is worked out afterwards from
+    /// `replaced`, which lies in the cache.
     fn keep(&mut self, answer: &Answer) -> Result<(), EngineError> {
         self.replaced.clear();
         let (requests, colours) = (answer.requests.len(), answer.rgb.len());
@@ -248,6 +251,9 @@ impl<T: Tracer> Engine<T> {
             return Ok(());
         }
         for (i, (request, &rgb)) in answer.requests.iter().zip(&answer.rgb).enumerate() {
+            if let Some(later) = answer.requests.get(i + AHEAD) {
+                self.canvas.prefetch(later.pixel);
+            }
             let pixel = request.pixel;
             if pixel as usize >= size.pixels() {
                 let Size { width, height } = size;

@@ -90,15 +90,7 @@ mod tests {
     use super::*;
 
     fn surface(object: u32, position: [f32; 3]) -> Surface {
-        Surface {
-            object,
-            primitive: 0,
-            position,
-            normal: [0.0; 3],
-            albedo: [0.0; 3],
-            direct: [0.0; 3],
-            lit: 0,
-        }
+        Surface { object, position, ..Surface::default() }
     }
 
     /// Looks along −z from the origin, focal length 100 pixels, middle of the picture at (50, 40).

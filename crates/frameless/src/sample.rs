@@ -123,8 +123,8 @@ impl Answer {
     }
 }
 
-/// The surface that a ray hit first, in coordinates that move with the object.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The surface that a ray hit first, in coordinates that move with the object. The default is all zeros.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Surface {
     /// Which object, stable over time. [`Surface::SKY`] where nothing was hit.
     pub object: u32,

@@ -91,6 +91,14 @@ impl F8 {
         M8(both!(F4::less_than, self, other))
     }
 
+    /// The columns of eight rows of four.
+    #[inline(always)]
+    pub(crate) fn columns(rows: [&[f32; 4]; 8]) -> [F8; 4] {
+        let [a, b, c, d, e, f, g, h] = rows;
+        let (low, high) = (F4::transposed([a, b, c, d]), F4::transposed([e, f, g, h]));
+        [0, 1, 2, 3].map(|k| F8([low[k], high[k]]))
+    }
+
     /// Towards zero. Numbers that are not in 0..2³¹ give something.
     #[inline(always)]
     pub(crate) fn truncated(self) -> M8 {
@@ -249,7 +257,7 @@ impl<'a, T, const N: usize> Planes<'a, T, N> {
     fn eights(&self, start: usize) -> [&'a [T]; N] {
         assert!(start < self.len && self.len - start >= 8);
         // SAFETY: no plane is shorter than `len`, and eight numbers from `start` on are within it.
-        self.planes.map(|plane| unsafe { plane.get_unchecked(start..start + 8) })
+        std::array::from_fn(|k| unsafe { self.planes[k].get_unchecked(start..start + 8) })
     }
 }
 
@@ -266,21 +274,6 @@ impl<const N: usize> Planes<'_, u32, N> {
     #[inline(always)]
     pub(crate) fn load(&self, start: usize) -> [M8; N] {
         self.eights(start).map(|eight| M8::load(eight, 0))
-    }
-}
-
-/// `into[k] = from[index[k]]`.
-///
-/// # Panics
-/// If an index is not in `from`, or there are not as many as places.
-#[inline(always)]
-pub(crate) fn gather<T: Copy>(into: &mut [T], from: &[T], index: &[u32]) {
-    assert_eq!(into.len(), index.len());
-    let largest = index.iter().fold(0, |largest, &i| largest.max(i));
-    assert!((largest as usize) < from.len());
-    for (into, &i) in into.iter_mut().zip(index) {
-        // SAFETY: no index is larger than `largest`, which has just been found to be in `from`.
-        *into = unsafe { *from.get_unchecked(i as usize) };
     }
 }
 

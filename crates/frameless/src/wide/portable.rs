@@ -27,6 +27,11 @@ impl F4 {
     }
 
     #[inline(always)]
+    pub(super) fn transposed(rows: [&[f32; 4]; 4]) -> [F4; 4] {
+        std::array::from_fn(|k| F4(rows.map(|row| row[k])))
+    }
+
+    #[inline(always)]
     pub(super) fn lanes(self) -> [f32; 4] {
         self.0
     }

@@ -26,6 +26,22 @@ impl F4 {
     }
 
     #[inline(always)]
+    pub(super) fn transposed(rows: [&[f32; 4]; 4]) -> [F4; 4] {
+        let [a, b, c, d] = rows.map(|row| F4::load(row).0);
+        unsafe {
+            let (ab01, cd01) = (_mm_unpacklo_ps(a, b), _mm_unpacklo_ps(c, d));
+            let (ab23, cd23) = (_mm_unpackhi_ps(a, b), _mm_unpackhi_ps(c, d));
+            [
+                _mm_movelh_ps(ab01, cd01),
+                _mm_movehl_ps(cd01, ab01),
+                _mm_movelh_ps(ab23, cd23),
+                _mm_movehl_ps(cd23, ab23),
+            ]
+            .map(F4)
+        }
+    }
+
+    #[inline(always)]
     pub(super) fn lanes(self) -> [f32; 4] {
         let mut lanes = [0.0; 4];
         unsafe { _mm_storeu_ps(lanes.as_mut_ptr(), self.0) };

@@ -1,9 +1,8 @@
 //! Aiming: where to trace, so that the hit lies on a pixel's centre at the next refresh.
 
-use super::Reproject;
-use super::store::surface;
+use super::{AHEAD, Reproject};
 use crate::tile::TileGrid;
-use crate::{Request, Time};
+use crate::{Request, Time, wide};
 
 /// Where to look for a surface in a hole: the farthest of these neighbours has probably been uncovered.
 const AROUND: [[i32; 2]; 8] = [[3, 0], [-3, 0], [0, 3], [0, -3], [6, 0], [-6, 0], [0, 6], [0, -6]];
@@ -23,20 +22,45 @@ impl Reproject {
         let (x, y) = size.xy(request.pixel);
         let position: [f32; 2] = std::array::from_fn(|k| {
             let here = [x, y][k] as f32 + 0.5;
-            let lands = (here + rest * motion[k]).floor() + 0.5;
+            let lands = floor(here + rest * motion[k]) + 0.5;
             let most = [size.width, size.height][k] as f32 - 0.01;
             (lands - rest * motion[k]).clamp(0.01, most)
         });
-        let [px, py] = position.map(f32::floor);
-        request.pixel = size.index(px as u32, py as u32);
-        request.offset = [position[0] - px - 0.5, position[1] - py - 0.5];
+        let [x, y] = position.map(|p| p as u32);
+        request.pixel = size.index(x, y);
+        request.offset = [position[0] - x as f32 - 0.5, position[1] - y as f32 - 0.5];
+    }
+
+    /// Begins to fetch what [`Reproject::motion`] will look at after request `i`: first what is in the pixel, then what is around it
+    /// if that is nothing.
+    #[inline(always)]
+    pub(super) fn prefetch_motion(&self, requests: &[Request], i: usize) {
+        let size = self.store.layout.size;
+        if let Some(later) = requests.get(i + AHEAD) {
+            let (x, y) = size.xy(later.pixel);
+            for cell in self.store.of_pixel(x, y) {
+                wide::prefetch(&self.store.object, cell);
+                wide::prefetch(&self.store.tick, cell);
+                wide::prefetch(&self.store.anchor, cell);
+            }
+        }
+        if let Some(soon) = requests.get(i + AHEAD / 2) {
+            let (x, y) = size.xy(soon.pixel);
+            if self.store.newest(x, y).is_none() {
+                for cell in self.cells_around(x, y) {
+                    wide::prefetch(&self.store.object, cell);
+                    wide::prefetch(&self.store.depth, cell);
+                    wide::prefetch(&self.store.anchor, cell);
+                }
+            }
+        }
     }
 
     /// How far what is seen at a pixel moves from one refresh to the next, in pixels.
     fn motion(&self, pixel: u32) -> Option<[f32; 2]> {
         let (x, y) = self.store.layout.size.xy(pixel);
         let cell = self.store.newest(x, y).or_else(|| self.uncovered(x, y))?;
-        let surface = surface(self.store.object[cell], &self.store.anchor[cell]);
+        let surface = self.store.surface(cell);
         let here = self.poses[0].project(&surface)?.px;
         let before = self.poses[1].project(&surface)?.px;
         let motion = [here[0] - before[0], here[1] - before[1]];
@@ -53,13 +77,27 @@ impl Reproject {
         })
     }
 
+    /// The farthest sample around a hole.
     fn uncovered(&self, x: u32, y: u32) -> Option<usize> {
-        let size = self.store.layout.size;
-        let near = AROUND.iter().filter_map(|[dx, dy]| {
-            let (x, y) = (x.checked_add_signed(*dx)?, y.checked_add_signed(*dy)?);
-            let inside = x < size.width && y < size.height;
-            inside.then(|| self.store.newest(x, y)).flatten()
-        });
+        let near = self.cells_around(x, y).filter_map(|first| self.store.newest_of(first));
         near.max_by(|&a, &b| self.store.depth[a].total_cmp(&self.store.depth[b]))
     }
+
+    /// First cells of the pixels [`AROUND`].
+    #[inline(always)]
+    fn cells_around(&self, x: u32, y: u32) -> impl Iterator<Item = usize> {
+        let layout = self.store.layout;
+        AROUND.iter().filter_map(move |[dx, dy]| {
+            let (x, y) = (x.checked_add_signed(*dx)?, y.checked_add_signed(*dy)?);
+            let inside = x < layout.size.width && y < layout.size.height;
+            inside.then(|| layout.of_pixel(x as i32, y as i32))
+        })
+    }
+}
+
+/// Of a small number: `f32::floor` is a call to a library.
+#[inline(always)]
+fn floor(x: f32) -> f32 {
+    let whole = x as i32 as f32;
+    if whole > x { whole - 1.0 } else { whole }
 }

@@ -11,7 +11,7 @@
 
 use super::fill::{self, AROUND};
 use super::holes::{Hole, Waiting};
-use super::store::{CENTRAL_PX, EMPTY, Layout, Store, TICK_SECS, Tick};
+use super::store::{EMPTY, Layout, Store, TICK_SECS, Tick, centres, distance2};
 use crate::rates::Rates;
 use crate::wide::{self, F8, M8, Planes};
 use crate::{Size, Time};
@@ -106,20 +106,16 @@ impl<F: Fn(u32) -> bool> wide::Task for OffCentre<'_, F> {
     #[inline(always)]
     fn run(self) {
         let OffCentre { store, rests, waiting } = self;
-        let Layout { size, per_side, plane, .. } = store.layout;
+        let Layout { size, plane, .. } = store.layout;
         for y in 0..size.height {
             for x in (0..size.width).step_by(8) {
                 let first = store.layout.of_pixel(x as i32, y as i32);
-                let centre = centres(x, y);
                 let (mut known, mut central) = (M8::splat(0), M8::splat(0));
-                for sub in 0..(per_side * per_side) as usize {
+                for sub in 0..store.layout.subs() {
                     let i = first + sub * plane;
                     let is_sample = M8::load(&store.object, i).equals(M8::splat(EMPTY)).not();
-                    let px = [F8::load(&store.px[0], i), F8::load(&store.px[1], i)];
-                    let is_near =
-                        distance2(px, &centre).less_than(F8::splat(CENTRAL_PX * CENTRAL_PX));
                     known = known.either(is_sample);
-                    central = central.either(is_sample.and(is_near));
+                    central = central.either(store.are_central(i, x, y));
                 }
                 // Cells beyond the border are empty.
                 known.and(central.not()).for_each(|lane| {
@@ -131,19 +127,6 @@ impl<F: Fn(u32) -> bool> wide::Task for OffCentre<'_, F> {
             }
         }
     }
-}
-
-/// Of the eight pixels from (x, y) on.
-#[inline(always)]
-fn centres(x: u32, y: u32) -> [F8; 2] {
-    let columns = M8::new([0, 1, 2, 3, 4, 5, 6, 7]).plus(M8::splat(x));
-    [columns.to_f32() + F8::splat(0.5), F8::splat(y as f32 + 0.5)]
-}
-
-#[inline(always)]
-fn distance2(px: [F8; 2], centre: &[F8; 2]) -> F8 {
-    let (dx, dy) = (px[0] - centre[0], px[1] - centre[1]);
-    dx * dx + dy * dy
 }
 
 /// From the first cell of a pixel to others.

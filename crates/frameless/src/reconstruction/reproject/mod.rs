@@ -21,6 +21,7 @@ use super::ReprojectOptions;
 use super::contrast::tile_contrast;
 use crate::rates::Rates;
 use crate::tile::TileGrid;
+use crate::wide;
 use crate::{
     Canvas, Display, Findings, Kept, Pose, Reconstruction, Refinement, Refresh, Request, Size, Time,
 };
@@ -85,6 +86,20 @@ impl Reproject {
         }
     }
 
+    /// Begins to fetch what sample `i` of those kept will be compared with: samples lie all over the picture, and waiting for
+    /// memory would take longer than everything else.
+    #[inline(always)]
+    fn prefetch(&self, kept: &Kept<'_>, i: usize) {
+        let Some(&Request { pixel, .. }) = kept.requests.get(i + AHEAD) else { return };
+        let Size { width, height } = kept.size;
+        let (x, y) = kept.size.xy(pixel);
+        self.store.prefetch(x, y);
+        self.settled.prefetch(pixel);
+        for y in y.saturating_sub(1)..(y + 2).min(height) {
+            wide::prefetch(&self.shown, (y * width + x) as usize);
+        }
+    }
+
     /// Adds a sample to those of its pixel, if it is meant to be and the pixel is at rest.
     fn refine(&mut self, kept: &Kept<'_>, i: usize, display: &Display) -> Option<Refinement> {
         let (request, rgb) = (kept.requests[i], kept.new[i]);
@@ -99,11 +114,14 @@ impl Reproject {
                 kept.now.secs_since(Tick(self.store.tick[cell]).time(kept.now))
             });
             refinement.suspect = age_secs > LONG_SINCE_SECS
-                && self.beyond_range(centre, display.encode(rgb)) > 3.0 * residual::OUTDATED;
+                && self.around(centre).beyond_range(display.encode(rgb)) > 3.0 * residual::OUTDATED;
         }
         Some(refinement)
     }
 }
+
+/// So many samples later what is prefetched is used.
+const AHEAD: usize = 16;
 
 /// A suspect pixel whose centre was traced later than this before is not looked at again: it shows something finer than a pixel.
 const LONG_SINCE_SECS: f64 = 0.05;
@@ -112,6 +130,7 @@ impl Reconstruction for Reproject {
     fn keep(&mut self, kept: &Kept<'_>, display: &Display, findings: &mut Findings) {
         self.fit(kept.size);
         for i in 0..kept.requests.len() {
+            self.prefetch(kept, i);
             if let Some(refinement) = self.refine(kept, i, display) {
                 findings.changes.push(0.0);
                 findings.refinements.resize(i, None);
@@ -130,8 +149,11 @@ impl Reconstruction for Reproject {
         let is_out = self.options.without == Some(ReprojectStage::Aim);
         if self.refreshes >= 2 && self.store.layout.size == canvas.size() && !is_out {
             // Those that add to a pixel's samples lie where they are to lie.
-            for request in requests.iter_mut().filter(|request| request.sample_index == 0) {
-                self.aim_one(now, request);
+            for i in 0..requests.len() {
+                self.prefetch_motion(requests, i);
+                if requests[i].sample_index == 0 {
+                    self.aim_one(now, &mut requests[i]);
+                }
             }
         }
     }
@@ -159,7 +181,10 @@ impl Reconstruction for Reproject {
             self.settled.hand_over(&mut self.store, refresh.display);
         }
         if !at_rest {
-            self.warp.run(&mut self.store, &self.poses[0]);
+            // Of what was kept before the first refresh nobody knows yet where it is.
+            let (first, settled) = (self.refreshes < 2, &self.settled);
+            let rests = |object| object == store::SCREEN || !first && settled.rests(object);
+            self.warp.run(&mut self.store, &self.poses[0], rests);
             if self.options.without != Some(ReprojectStage::Cracks) {
                 self.warp.remove_seen_through_cracks(&mut self.store);
             }
@@ -168,6 +193,7 @@ impl Reconstruction for Reproject {
         if std::mem::replace(&mut self.display, display) != display {
             let (store, relight) = (&mut self.store, &self.relight);
             store.encode_again(&display, |store, cell| relight.linear(store, cell));
+            self.settled.encode_again(&display);
         }
         if let Some(lighting) = refresh.lighting {
             self.relight.run(&mut self.store, lighting, &display);

@@ -12,6 +12,12 @@ pub(super) struct PackedAlbedo(u32);
 const NORMAL_STEPS: f32 = 32_767.0;
 const ALBEDO_STEPS: f32 = 1023.0;
 
+/// To the nearest whole number, half away from zero, for small numbers: `f32::round` is a call to a library.
+#[inline(always)]
+fn rounded(x: f32) -> i32 {
+    (x + 0.5f32.copysign(x)) as i32
+}
+
 impl PackedNormal {
     pub(super) fn new([x, y, z]: [f32; 3]) -> PackedNormal {
         let sum = (x.abs() + y.abs() + z.abs()).max(f32::MIN_POSITIVE);
@@ -21,7 +27,7 @@ impl PackedNormal {
         } else {
             (u, v)
         };
-        let bits = |c: f32| u32::from((c * NORMAL_STEPS).round() as i16 as u16);
+        let bits = |c: f32| u32::from(rounded(c * NORMAL_STEPS) as i16 as u16);
         PackedNormal(bits(u) << 16 | bits(v))
     }
 
@@ -40,7 +46,7 @@ impl PackedNormal {
 
 impl PackedAlbedo {
     pub(super) fn new(albedo: [f32; 3]) -> PackedAlbedo {
-        let bits = |c: f32| (c.clamp(0.0, 1.0).sqrt() * ALBEDO_STEPS).round() as u32;
+        let bits = |c: f32| rounded(c.clamp(0.0, 1.0).sqrt() * ALBEDO_STEPS) as u32;
         PackedAlbedo(bits(albedo[0]) << 20 | bits(albedo[1]) << 10 | bits(albedo[2]))
     }
 

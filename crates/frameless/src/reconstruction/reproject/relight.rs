@@ -7,7 +7,7 @@
 //! What the object emits and reflects, and ambient light, stay as they were until the pixel is traced again; so do shadows.
 
 use super::holes::{Hole, Waiting};
-use super::store::{EMPTY, Sample, Shade, Store, surface};
+use super::store::{EMPTY, Sample, Shade, Store};
 use crate::{Display, Light, Lighting, Surface};
 
 /// The lights under which the stored samples are shown.
@@ -18,6 +18,7 @@ pub(super) struct Relight {
     moved: u32,
     /// Objects that look different under the new lights, or stand differently in them.
     changed: Vec<bool>,
+    any_changed: bool,
 }
 
 impl Shade {
@@ -35,17 +36,25 @@ impl Shade {
 }
 
 impl Relight {
-    /// What the sample would have looked like at the last refresh, as far as lights are concerned. Display-referred.
+    /// What the sample would have looked like at the last refresh, as far as lights are concerned. Display-referred. What looked
+    /// alike at the last two refreshes is thought to look so still.
     pub(super) fn as_shown(&self, sample: &Sample, display: &Display) -> [f32; 3] {
+        if !self.has_changed(sample.object) {
+            return sample.rgb;
+        }
         let relit = sample.shade.relit(&sample.surface(), &self.shown);
         relit.map_or(sample.rgb, |rgb| display.encode(rgb))
     }
 
     /// Linear colour of the sample in a cell as it is shown.
     pub(super) fn linear(&self, store: &Store, cell: usize) -> [f32; 3] {
-        let (surface, shade) =
-            (surface(store.object[cell], &store.anchor[cell]), &store.shade[cell]);
-        shade.relit(&surface, &self.shown).unwrap_or(shade.rgb)
+        let shade = store.shade(cell);
+        shade.relit(&store.surface(cell), &self.shown).unwrap_or(shade.rgb)
+    }
+
+    /// Whether any object's samples were shaded again at the last refresh.
+    pub(super) fn has_changed_any(&self) -> bool {
+        self.any_changed
     }
 
     /// Whether an object's samples were shaded again at the last refresh.
@@ -53,13 +62,8 @@ impl Relight {
         self.changed.get(object as usize).is_some_and(|&changed| changed)
     }
 
-    /// Shows all samples of objects for which something has changed under the new lights. Returns whether any has.
-    pub(super) fn run(
-        &mut self,
-        store: &mut Store,
-        lighting: &Lighting,
-        display: &Display,
-    ) -> bool {
+    /// Shows all samples of objects for which something has changed under the new lights.
+    pub(super) fn run(&mut self, store: &mut Store, lighting: &Lighting, display: &Display) {
         self.moved = moved(&lighting.lights, &self.shown.lights);
         let everything = lighting.lights != self.shown.lights;
         let then = &self.shown.world_from_object;
@@ -68,12 +72,11 @@ impl Relight {
         self.changed.extend(
             placements.map(|(object, place)| everything || then.get(object) != Some(place)),
         );
-        let any = self.changed.contains(&true);
-        if any {
+        self.any_changed = self.changed.contains(&true);
+        if self.any_changed {
             self.shown.clone_from(lighting);
             self.shade(store, display);
         }
-        any
     }
 
     /// Pixels at the edges of shadows whose lights have moved: there the shadow is somewhere else by now.
@@ -85,7 +88,7 @@ impl Relight {
         let size = layout.size;
         let differ = |a: usize, b: usize| {
             store.object[a] == store.object[b]
-                && (store.shade[a].lit ^ store.shade[b].lit) & self.moved != 0
+                && (store.shade(a).lit ^ store.shade(b).lit) & self.moved != 0
         };
         for y in 0..size.height {
             for x in 0..size.width {
@@ -104,8 +107,7 @@ impl Relight {
             if object == EMPTY || !self.has_changed(object) {
                 continue;
             }
-            let surface = surface(object, &store.anchor[i]);
-            if let Some(rgb) = store.shade[i].relit(&surface, &self.shown) {
+            if let Some(rgb) = store.shade(i).relit(&store.surface(i), &self.shown) {
                 let rgb = display.encode(rgb);
                 (0..3).for_each(|k| store.rgb[k][i] = rgb[k]);
             }

@@ -6,7 +6,7 @@
 
 use super::store::{SCREEN, Sample};
 use super::{Reproject, ReprojectStage};
-use crate::{Display, Kept, Request};
+use crate::{Display, Kept, Request, Size};
 
 /// What a sample found.
 pub(super) struct Found {
@@ -41,7 +41,7 @@ impl Reproject {
     ) -> Found {
         let rgb =
             if self.options.relight { self.relight.as_shown(sample, display) } else { sample.rgb };
-        let found = self.against_shown(sample, rgb, display.encode(kept.old[i]));
+        let found = self.against_shown(sample, rgb, || display.encode(kept.old[i]));
         let request = kept.requests[i];
         let (x, y) = kept.size.xy(request.pixel);
         if request == Request::centre(request.pixel)
@@ -53,7 +53,8 @@ impl Reproject {
             let before = std::array::from_fn(|k| self.store.rgb[k][cell]);
             let change = squared(rgb, before);
             if self.settled.count(request.pixel) > 0 {
-                self.settled.verify(request.pixel, kept.new[i], change, kept.is_noisy);
+                let (rgb, is_noisy) = (kept.new[i], kept.is_noisy);
+                self.settled.verify(request.pixel, rgb, change, display, is_noisy);
             }
             return Found { change, outdated: change > 3.0 * OUTDATED, ..found };
         }
@@ -64,9 +65,9 @@ impl Reproject {
         found
     }
 
-    fn against_shown(&self, sample: &Sample, rgb: [f32; 3], old: [f32; 3]) -> Found {
+    fn against_shown(&self, sample: &Sample, rgb: [f32; 3], old: impl Fn() -> [f32; 3]) -> Found {
         if self.refreshes == 0 || sample.object == SCREEN {
-            let change = squared(sample.rgb, old);
+            let change = squared(sample.rgb, old());
             return Found { change, outdated: change > 3.0 * OUTDATED, depth: f32::INFINITY };
         }
         let size = self.store.layout.size;
@@ -79,7 +80,8 @@ impl Reproject {
         let Some(px) = then.map(|there| there.px).filter(inside) else {
             return Found { change: UNKNOWN, outdated: true, depth };
         };
-        let raw = squared(rgb, self.nearest(px)).min(squared(rgb, self.bilinear(px)));
+        let shown = self.around(px);
+        let raw = squared(rgb, shown.nearest()).min(squared(rgb, shown.bilinear(px)));
         let outdated = raw > 3.0 * OUTDATED;
         let moving = self.options.without != Some(ReprojectStage::Range)
             && self.refreshes >= 2
@@ -87,50 +89,64 @@ impl Reproject {
                 let [dx, dy] = [before.px[0] - px[0], before.px[1] - px[1]];
                 dx * dx + dy * dy > AT_REST_PX * AT_REST_PX
             });
-        let change = if moving { self.beyond_range(px, rgb) + RAW * raw } else { raw };
+        let change = if moving { shown.beyond_range(rgb) + RAW * raw } else { raw };
         Found { change, outdated, depth }
     }
 
-    fn at(&self, x: i32, y: i32) -> [f32; 3] {
-        let size = self.store.layout.size;
-        let x = x.clamp(0, size.width as i32 - 1) as u32;
-        let y = y.clamp(0, size.height as i32 - 1) as u32;
-        self.shown[size.index(x, y) as usize]
+    /// What is shown around a position inside the picture; beyond its border, what is shown at the border.
+    #[inline(always)]
+    pub(super) fn around(&self, px: [f32; 2]) -> Around {
+        let Size { width, height } = self.store.layout.size;
+        let (x, y) = (px[0] as u32, px[1] as u32);
+        let (left, right) = (x.saturating_sub(1), (x + 1).min(width - 1));
+        let row = |y: u32| [left, x, right].map(|x| self.shown[(y * width + x) as usize]);
+        Around {
+            middle: [x as f32, y as f32],
+            rgb: [row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1))],
+        }
+    }
+}
+
+/// The colours of 3×3 pixels.
+pub(super) struct Around {
+    /// Column and row of the one in the middle.
+    middle: [f32; 2],
+    /// Row by row.
+    rgb: [[[f32; 3]; 3]; 3],
+}
+
+impl Around {
+    fn nearest(&self) -> [f32; 3] {
+        self.rgb[1][1]
     }
 
-    fn nearest(&self, px: [f32; 2]) -> [f32; 3] {
-        self.at(px[0] as i32, px[1] as i32)
-    }
-
+    /// Interpolated between the pixels' centres.
+    #[inline(always)]
     fn bilinear(&self, px: [f32; 2]) -> [f32; 3] {
-        let (x, y) = (px[0] - 0.5, px[1] - 0.5);
-        let (x0, y0) = (x.floor(), y.floor());
-        let (u, v) = (x - x0, y - y0);
-        let (x0, y0) = (x0 as i32, y0 as i32);
-        let [a, b] = [self.at(x0, y0), self.at(x0 + 1, y0)];
-        let [c, d] = [self.at(x0, y0 + 1), self.at(x0 + 1, y0 + 1)];
+        let from_centre = [px[0] - self.middle[0] - 0.5, px[1] - self.middle[1] - 0.5];
+        // The first of the two columns, and of the two rows.
+        let [(x, u), (y, v)] = from_centre.map(|d| if d < 0.0 { (0, d + 1.0) } else { (1, d) });
+        let [a, b] = [self.rgb[y][x], self.rgb[y][x + 1]];
+        let [c, d] = [self.rgb[y + 1][x], self.rgb[y + 1][x + 1]];
         std::array::from_fn(|k| {
             (a[k] * (1.0 - u) + b[k] * u) * (1.0 - v) + (c[k] * (1.0 - u) + d[k] * u) * v
         })
     }
 
-    /// Squared distance to the range of the colours in the 3×3 pixels around.
-    pub(super) fn beyond_range(&self, px: [f32; 2], rgb: [f32; 3]) -> f32 {
-        let (x, y) = (px[0] as i32, px[1] as i32);
+    /// Squared distance to the range of the colours.
+    #[inline(always)]
+    pub(super) fn beyond_range(&self, rgb: [f32; 3]) -> f32 {
         let (mut low, mut high) = ([f32::MAX; 3], [f32::MIN; 3]);
-        for ny in y - 1..=y + 1 {
-            for nx in x - 1..=x + 1 {
-                let c = self.at(nx, ny);
-                for k in 0..3 {
-                    low[k] = low[k].min(c[k]);
-                    high[k] = high[k].max(c[k]);
-                }
+        for c in self.rgb.as_flattened() {
+            for k in 0..3 {
+                low[k] = low[k].min(c[k]);
+                high[k] = high[k].max(c[k]);
             }
         }
         (0..3).map(|k| (low[k] - rgb[k]).max(rgb[k] - high[k]).max(0.0).powi(2)).sum()
     }
 }
 
-fn squared(a: [f32; 3], b: [f32; 3]) -> f32 {
+pub(super) fn squared(a: [f32; 3], b: [f32; 3]) -> f32 {
     (0..3).map(|k| (a[k] - b[k]).powi(2)).sum()
 }

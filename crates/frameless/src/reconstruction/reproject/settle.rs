@@ -15,23 +15,36 @@
 //! ```
 
 use super::relight::Relight;
-use super::store::{EMPTY, SCREEN, Store};
+use super::residual::squared;
+use super::store::{EMPTY, Layout, SCREEN, Store};
 use crate::tile::TileGrid;
+use crate::wide::{self, M8};
 use crate::{Display, Pose, Refinement, Refresh, Size, Surface};
 
 /// Per pixel what its samples add up to; nothing where it is not at rest.
 #[derive(Default)]
 pub(super) struct Settled {
-    sum: Vec<[f32; 3]>,
     count: Vec<u16>,
-    /// (n − 1) σ².
-    spread: Vec<f32>,
+    mean: Vec<Mean>,
     grid: Option<TileGrid>,
     /// Per tile: the variance of a pixel's samples.
     noise: Vec<f32>,
+    /// Scratch memory: per first cell of a pixel 1 if something moves in it.
+    moving: Vec<u8>,
     /// Object numbers that have moved since the last refresh.
     moved: Vec<bool>,
     sky_moved: bool,
+}
+
+/// What the samples of a pixel add up to.
+#[derive(Clone, Copy, Default)]
+struct Mean {
+    /// Linear RGB.
+    sum: [f32; 3],
+    /// (n − 1) σ².
+    spread: f32,
+    /// μ, display-referred.
+    encoded: [f32; 3],
 }
 
 /// Samples that add up in a pixel where the renderer has no noise: more cannot be told apart in 8 bits.
@@ -52,9 +65,8 @@ const SUSPECT: f32 = 9.0;
 impl Settled {
     pub(super) fn fit(&mut self, size: Size) {
         let grid = TileGrid::new(size, TILE);
-        self.sum = vec![[0.0; 3]; size.pixels()];
         self.count = vec![0; size.pixels()];
-        self.spread = vec![0.0; size.pixels()];
+        self.mean = vec![Mean::default(); size.pixels()];
         self.noise = vec![0.0; grid.len()];
         self.grid = Some(grid);
     }
@@ -69,19 +81,36 @@ impl Settled {
         self.count.get(pixel as usize).copied().unwrap_or(0)
     }
 
+    /// Begins to fetch what is known of a pixel.
+    #[inline(always)]
+    pub(super) fn prefetch(&self, pixel: u32) {
+        wide::prefetch(&self.count, pixel as usize);
+        wide::prefetch(&self.mean, pixel as usize);
+    }
+
     /// Variance of the samples of a pixel in the tile, Σ over the channels, as far as it is known.
     pub(super) fn noise(&self, pixel: u32) -> f32 {
         self.grid.as_ref().map_or(0.0, |grid| self.noise[grid.tile_of(pixel)])
     }
 
-    pub(super) fn begin(&mut self, pixel: usize, rgb: [f32; 3]) {
-        (self.sum[pixel], self.count[pixel], self.spread[pixel]) = (rgb, 1, 0.0);
+    fn begin(&mut self, pixel: usize, rgb: [f32; 3], display: &Display) {
+        self.count[pixel] = 1;
+        self.mean[pixel] = Mean { sum: rgb, spread: 0.0, encoded: display.encode(rgb) };
     }
 
     /// Linear mean of the pixel's samples.
-    pub(super) fn mean(&self, pixel: usize) -> [f32; 3] {
+    fn mean(&self, pixel: usize) -> [f32; 3] {
         let per_count = 1.0 / f32::from(self.count[pixel]);
-        self.sum[pixel].map(|c| c * per_count)
+        self.mean[pixel].sum.map(|c| c * per_count)
+    }
+
+    /// Means for another display.
+    pub(super) fn encode_again(&mut self, display: &Display) {
+        for pixel in 0..self.count.len() {
+            if self.count[pixel] > 0 {
+                self.mean[pixel].encoded = display.encode(self.mean(pixel));
+            }
+        }
     }
 
     /// One more sample of a pixel at rest.
@@ -98,31 +127,40 @@ impl Settled {
             return Refinement { deviation: 0.0, suspect: false };
         }
         let n = f32::from(self.count[pixel]);
-        let deviation = display.change(rgb, self.mean(pixel)) * n / (n + 1.0);
-        let suspect = deviation > SUSPECT * (self.spread[pixel] + FIRST_SPREAD) / n;
-        self.spread[pixel] += deviation;
+        let Mean { spread, encoded, .. } = self.mean[pixel];
+        let deviation = squared(display.encode(rgb), encoded) * n / (n + 1.0);
+        let suspect = deviation > SUSPECT * (spread + FIRST_SPREAD) / n;
+        self.mean[pixel].spread += deviation;
         if let Some(tile) = tile {
             self.noise[tile] += NOISE_MEMORY * (deviation - self.noise[tile]);
         }
         if self.count[pixel] == MOST_SAMPLES {
             self.keep_only(pixel, MOST_SAMPLES / 2);
         }
-        (0..3).for_each(|k| self.sum[pixel][k] += rgb[k]);
+        (0..3).for_each(|k| self.mean[pixel].sum[k] += rgb[k]);
         self.count[pixel] += 1;
+        self.mean[pixel].encoded = display.encode(self.mean(pixel));
         Refinement { deviation, suspect }
     }
 
     /// The sample at the centre has changed by `change` (Σ over the channels) to the linear `rgb`.
-    pub(super) fn verify(&mut self, pixel: u32, rgb: [f32; 3], change: f32, is_noisy: bool) {
+    pub(super) fn verify(
+        &mut self,
+        pixel: u32,
+        rgb: [f32; 3],
+        change: f32,
+        display: &Display,
+        is_noisy: bool,
+    ) {
         if change <= SAME {
             return;
         }
         let pixel = pixel as usize;
         let n = self.count[pixel];
-        let variance = self.spread[pixel] / (f32::from(n) - 1.0).max(1.0);
+        let variance = self.mean[pixel].spread / (f32::from(n) - 1.0).max(1.0);
         let as_good = if is_noisy { (variance / change) as u16 } else { 0 };
         if as_good <= 1 {
-            self.begin(pixel, rgb);
+            self.begin(pixel, rgb, display);
         } else if as_good < n {
             self.keep_only(pixel, as_good);
         }
@@ -130,8 +168,9 @@ impl Settled {
 
     fn keep_only(&mut self, pixel: usize, count: u16) {
         let part = f32::from(count) / f32::from(self.count[pixel]);
-        self.sum[pixel] = self.sum[pixel].map(|c| c * part);
-        self.spread[pixel] *= part;
+        let mean = &mut self.mean[pixel];
+        mean.sum = mean.sum.map(|c| c * part);
+        mean.spread *= part;
         self.count[pixel] = count;
     }
 
@@ -183,33 +222,153 @@ impl Settled {
         refresh: &Refresh<'_>,
         picture: &mut [[f32; 3]],
     ) {
-        let size = store.layout.size;
-        for (pixel, rgb) in picture.iter_mut().enumerate() {
-            let (x, y) = size.xy(pixel as u32);
-            let cell = store.central(x, y);
-            match cell.filter(|_| self.all_rest_around(store, x, y)) {
-                Some(cell) if self.count[pixel] == 0 || relight.has_changed(store.object[cell]) => {
-                    self.begin(pixel, relight.linear(store, cell));
-                }
-                Some(_) if self.count[pixel] > 1 => *rgb = refresh.display.encode(self.mean(pixel)),
-                Some(_) => {}
-                None => {
-                    if let Some(cell) = cell.filter(|_| refresh.is_noisy && self.count[pixel] > 1) {
-                        store.recolour(cell, self.mean(pixel), refresh.display);
+        self.find_moving(store);
+        wide::run(Show { settled: self, store, relight, refresh, picture });
+    }
+
+    /// Marks the pixels of which a sample moves.
+    fn find_moving(&mut self, store: &Store) {
+        self.moving.clear();
+        self.moving.resize(store.layout.plane, 0);
+        if self.anything_moves() {
+            let moving = std::mem::take(&mut self.moving);
+            let mut marks = Marks { settled: self, store, moving };
+            wide::run(&mut marks);
+            self.moving = marks.moving;
+        }
+    }
+
+    fn anything_moves(&self) -> bool {
+        self.sky_moved || self.moved.contains(&true)
+    }
+}
+
+/// The pixels of which a sample moves, each at its first cell.
+struct Marks<'a> {
+    settled: &'a Settled,
+    store: &'a Store,
+    moving: Vec<u8>,
+}
+
+impl wide::Task for &mut Marks<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let (eights, _) = self.store.object.as_chunks::<8>();
+        for sub in eights.chunks_exact(self.store.layout.plane / 8) {
+            for (objects, marks) in sub.iter().zip(self.moving.as_chunks_mut::<8>().0) {
+                let first = objects[0];
+                if objects.iter().any(|&object| object != first) {
+                    for (mark, &object) in marks.iter_mut().zip(objects) {
+                        *mark |= u8::from(!self.settled.rests(object));
                     }
-                    self.count[pixel] = 0;
+                } else if !self.settled.rests(first) {
+                    *marks = [1; 8];
                 }
             }
         }
     }
+}
 
-    /// In the pixel and the eight around it.
-    fn all_rest_around(&self, store: &Store, x: u32, y: u32) -> bool {
-        let Size { width, height } = store.layout.size;
-        (y.saturating_sub(1)..(y + 2).min(height)).all(|ny| {
-            (x.saturating_sub(1)..(x + 2).min(width))
-                .all(|nx| store.of_pixel(nx, ny).all(|cell| self.rests(store.object[cell])))
+/// Eight pixels at a time.
+struct Show<'a> {
+    settled: &'a mut Settled,
+    store: &'a mut Store,
+    relight: &'a Relight,
+    refresh: &'a Refresh<'a>,
+    picture: &'a mut [[f32; 3]],
+}
+
+impl wide::Task for Show<'_> {
+    #[inline(always)]
+    fn run(mut self) {
+        let Size { width, height } = self.store.layout.size;
+        for y in 0..height {
+            for x in (0..width).step_by(8) {
+                self.eight(x, y, 8.min((width - x) as usize));
+            }
+        }
+    }
+}
+
+impl Show<'_> {
+    #[inline(always)]
+    fn eight(&mut self, x: u32, y: u32, lanes: usize) {
+        let start = self.store.layout.size.index(x, y) as usize;
+        let rest = self.at_rest(x, y) & ((1 << lanes) - 1);
+        let counts = &self.settled.count[start..start + lanes];
+        let has = |is: fn(u16) -> bool| {
+            counts.iter().enumerate().fold(0u32, |bits, (lane, &n)| bits | u32::from(is(n)) << lane)
+        };
+        let (some, many) = (has(|n| n > 0), has(|n| n > 1));
+        let mut begin = rest & !some;
+        if self.relight.has_changed_any() {
+            begin |= rest & some & self.relit(x, y, lanes);
+        }
+        each(begin, |lane| self.begin(x + lane as u32, y));
+        each(some & !rest, |lane| self.end(x + lane as u32, y));
+        let shown = many & rest & !begin;
+        each(shown, |lane| self.picture[start + lane] = self.settled.mean[start + lane].encoded);
+    }
+
+    /// A bit for each of eight pixels: whether it has a sample at its centre, and nothing moves in it and the eight around it.
+    #[inline(always)]
+    fn at_rest(&self, x: u32, y: u32) -> u32 {
+        let Layout { plane, stride, .. } = self.store.layout;
+        let first = self.store.layout.of_pixel(x as i32, y as i32);
+        let around = [first - stride, first, first + stride].map(|i| {
+            let eight = |i: usize| {
+                u64::from_le_bytes(self.settled.moving[i..i + 8].try_into().expect("eight"))
+            };
+            eight(i - 1) | eight(i) | eight(i + 1)
+        });
+        let moving = (around[0] | around[1] | around[2]).to_le_bytes();
+        let still =
+            moving.iter().enumerate().fold(0, |bits, (lane, &m)| bits | u32::from(m == 0) << lane);
+        if still == 0 {
+            return 0;
+        }
+        let subs = (0..self.store.layout.subs()).map(|sub| first + sub * plane);
+        let central =
+            subs.fold(M8::splat(0), |any, cell| any.either(self.store.are_central(cell, x, y)));
+        still & central.bits()
+    }
+
+    /// A bit for each of eight pixels: whether its sample at the centre has been shaded again.
+    #[inline(always)]
+    fn relit(&self, x: u32, y: u32, lanes: usize) -> u32 {
+        (0..lanes).fold(0, |bits, lane| {
+            let cell = self.store.central(x + lane as u32, y);
+            let relit = cell.is_some_and(|cell| self.relight.has_changed(self.store.object[cell]));
+            bits | u32::from(relit) << lane
         })
+    }
+
+    fn begin(&mut self, x: u32, y: u32) {
+        if let Some(cell) = self.store.central(x, y) {
+            let pixel = self.store.layout.size.index(x, y) as usize;
+            let rgb = self.relight.linear(self.store, cell);
+            self.settled.begin(pixel, rgb, self.refresh.display);
+        }
+    }
+
+    fn end(&mut self, x: u32, y: u32) {
+        let pixel = self.store.layout.size.index(x, y) as usize;
+        if self.refresh.is_noisy
+            && self.settled.count[pixel] > 1
+            && let Some(cell) = self.store.central(x, y)
+        {
+            self.store.recolour(cell, self.settled.mean(pixel), self.refresh.display);
+        }
+        self.settled.count[pixel] = 0;
+    }
+}
+
+/// The bits that are set.
+#[inline(always)]
+fn each(mut bits: u32, mut act: impl FnMut(usize)) {
+    while bits != 0 {
+        act(bits.trailing_zeros() as usize);
+        bits &= bits - 1;
     }
 }
 
@@ -226,29 +385,29 @@ mod tests {
     #[test]
     fn samples_add_up_to_their_mean() {
         let (mut settled, display) = settled();
-        settled.begin(0, [0.1; 3]);
+        settled.begin(0, [0.1; 3], &display);
         for grey in [0.2, 0.3, 0.4] {
             settled.add(0, [grey; 3], &display, true);
         }
         assert_eq!(settled.count(0), 4);
         assert!((settled.mean(0)[1] - 0.25).abs() < 1e-6);
-        settled.verify(0, [0.1; 3], 0.0, false);
+        settled.verify(0, [0.1; 3], 0.0, &display, false);
         assert_eq!(settled.count(0), 4, "the same again");
-        settled.verify(0, [0.9; 3], 0.5, false);
+        settled.verify(0, [0.9; 3], 0.5, &display, false);
         assert_eq!((settled.count(0), settled.mean(0)), (1, [0.9; 3]), "begins anew");
     }
 
     #[test]
     fn a_small_change_shortens_a_noisy_mean() {
         let (mut settled, display) = settled();
-        settled.begin(0, [0.2; 3]);
+        settled.begin(0, [0.2; 3], &display);
         for i in 1..400 {
             settled.add(0, [if i % 2 == 0 { 0.2 } else { 0.3 }; 3], &display, true);
         }
         // σ² is about the squared half of the step, in all channels; a change a tenth of that in size leaves a hundred samples.
         let step = display.change([0.2; 3], [0.3; 3]);
         let mean = settled.mean(0);
-        settled.verify(0, [0.2; 3], step / 400.0, true);
+        settled.verify(0, [0.2; 3], step / 400.0, &display, true);
         assert!((80..130).contains(&settled.count(0)), "{}", settled.count(0));
         assert!((settled.mean(0)[0] - mean[0]).abs() < 1e-6, "the mean itself stays");
     }
@@ -256,7 +415,7 @@ mod tests {
     #[test]
     fn what_is_far_off_is_suspect() {
         let (mut settled, display) = settled();
-        settled.begin(0, [0.2; 3]);
+        settled.begin(0, [0.2; 3], &display);
         for _ in 0..20 {
             assert!(!settled.add(0, [0.21; 3], &display, true).suspect);
         }
@@ -266,7 +425,7 @@ mod tests {
     #[test]
     fn counting_never_overflows() {
         let (mut settled, display) = settled();
-        settled.begin(0, [0.5; 3]);
+        settled.begin(0, [0.5; 3], &display);
         for _ in 0..2 * u32::from(MOST_SAMPLES) {
             settled.add(0, [0.5; 3], &display, true);
         }

@@ -3,8 +3,12 @@
 //! Stored plane by plane, so that eight pixels at a time can be worked on. With n×n cells per pixel there are n² sub-grids, each with
 //! one cell of every pixel, one after the other; every sub-grid has a border of one empty cell, so that loops over neighbours
 //! need no bounds.
+//!
+//! What shading a sample again takes is needed only now and then, and lies in a slot. When the sample moves to another cell its slot
+//! stays where it is. There are as many slots as cells, and every cell has one, also while it is empty.
 
 use super::packed::{PackedAlbedo, PackedNormal};
+use crate::wide::{self, F8, M8};
 use crate::{Display, Kept, Size, Surface, Time};
 
 /// The object number of samples of which the renderer could not say what they hit: they stay where they are in the picture.
@@ -15,12 +19,22 @@ pub(super) const EMPTY: u32 = Surface::SKY - 2;
 /// A sample so near to the centre is as good as one at the centre: rounding of its projected position.
 pub(super) const CENTRAL_PX: f32 = 0.002;
 
-/// A point on an object, as in [`Surface`].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[repr(C)]
-pub(super) struct Anchor {
-    pub(super) position: [f32; 3],
-    pub(super) primitive: u32,
+/// A point on an object, as in [`Surface`]: its position, and the bits of the primitive's number.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Anchor(pub(super) [f32; 4]);
+
+impl Anchor {
+    fn new(surface: &Surface) -> Anchor {
+        let [x, y, z] = surface.position;
+        Anchor([x, y, z, f32::from_bits(surface.primitive)])
+    }
+
+    /// The point on `object`, and no more.
+    pub(super) fn on(&self, object: u32) -> Surface {
+        let [x, y, z, primitive] = self.0;
+        let (position, primitive) = ([x, y, z], primitive.to_bits());
+        Surface { object, primitive, position, ..Surface::default() }
+    }
 }
 
 /// What shading a sample again takes.
@@ -88,7 +102,7 @@ impl Shade {
 impl Sample {
     pub(super) fn new(kept: &Kept<'_>, i: usize, display: &Display) -> Sample {
         let (object, anchor) = match kept.surfaces.get(i) {
-            Some(s) => (s.object, Anchor { position: s.position, primitive: s.primitive }),
+            Some(surface) => (surface.object, Anchor::new(surface)),
             None => (SCREEN, Anchor::default()),
         };
         Sample {
@@ -103,20 +117,7 @@ impl Sample {
     }
 
     pub(super) fn surface(&self) -> Surface {
-        surface(self.object, &self.anchor)
-    }
-}
-
-pub(super) fn surface(object: u32, anchor: &Anchor) -> Surface {
-    let Anchor { position, primitive } = *anchor;
-    Surface {
-        object,
-        primitive,
-        position,
-        normal: [0.0; 3],
-        albedo: [0.0; 3],
-        direct: [0.0; 3],
-        lit: 0,
+        self.anchor.on(self.object)
     }
 }
 
@@ -139,8 +140,13 @@ impl Layout {
         Layout { size, per_side, stride, plane: stride * (size.height as usize + 2) }
     }
 
+    /// How many sub-grids there are: cells per pixel.
+    pub(super) fn subs(&self) -> usize {
+        (self.per_side * self.per_side) as usize
+    }
+
     pub(super) fn len(&self) -> usize {
-        self.plane * (self.per_side * self.per_side) as usize
+        self.plane * self.subs()
     }
 
     /// Where the first sub-grid's cell of pixel (x, y) is; −1 and the width or height lie in the border.
@@ -193,6 +199,8 @@ pub(super) struct Store {
     pub(super) tick: Vec<u32>,
     pub(super) object: Vec<u32>,
     pub(super) anchor: Vec<Anchor>,
+    pub(super) slot: Vec<u32>,
+    /// Per slot.
     pub(super) shade: Vec<Shade>,
 }
 
@@ -207,6 +215,7 @@ impl Store {
             tick: vec![0; layout.len()],
             object: vec![EMPTY; layout.len()],
             anchor: vec![Anchor::default(); layout.len()],
+            slot: (0..layout.len() as u32).collect(),
             shade: vec![Shade::default(); layout.len()],
             layout,
         }
@@ -219,7 +228,18 @@ impl Store {
         self.tick[i] = sample.tick.0;
         self.object[i] = sample.object;
         self.anchor[i] = sample.anchor;
-        self.shade[i] = sample.shade;
+        self.shade[self.slot[i] as usize] = sample.shade;
+    }
+
+    /// Where the sample in a cell is on its object.
+    #[inline(always)]
+    pub(super) fn surface(&self, i: usize) -> Surface {
+        self.anchor[i].on(self.object[i])
+    }
+
+    #[inline(always)]
+    pub(super) fn shade(&self, i: usize) -> &Shade {
+        &self.shade[self.slot[i] as usize]
     }
 
     /// All samples for another display, from their `linear` colours.
@@ -239,7 +259,7 @@ impl Store {
 
     /// Gives the sample in a cell another linear colour.
     pub(super) fn recolour(&mut self, i: usize, rgb: [f32; 3], display: &Display) {
-        self.shade[i] = Shade { rgb, ..self.shade[i] };
+        self.shade[self.slot[i] as usize].rgb = rgb;
         let encoded = display.encode(rgb);
         (0..3).for_each(|k| self.rgb[k][i] = encoded[k]);
     }
@@ -249,21 +269,48 @@ impl Store {
         self.object[i] == EMPTY
     }
 
+    /// Begins to fetch what is known of a pixel's samples.
+    #[inline(always)]
+    pub(super) fn prefetch(&self, x: u32, y: u32) {
+        for i in self.of_pixel(x, y) {
+            self.rgb.iter().chain(&self.px).for_each(|plane| wide::prefetch(plane, i));
+            wide::prefetch(&self.depth, i);
+            [&self.tick, &self.object, &self.slot]
+                .into_iter()
+                .for_each(|plane| wide::prefetch(plane, i));
+            wide::prefetch(&self.anchor, i);
+        }
+    }
+
     /// The cells of a pixel.
     #[inline(always)]
     pub(super) fn of_pixel(&self, x: u32, y: u32) -> impl Iterator<Item = usize> + use<> {
         let (first, plane) = (self.layout.of_pixel(x as i32, y as i32), self.layout.plane);
-        (0..(self.layout.per_side * self.layout.per_side) as usize)
-            .map(move |sub| first + sub * plane)
+        (0..self.layout.subs()).map(move |sub| first + sub * plane)
     }
 
     /// The cell of the newest sample in a pixel.
     #[inline(always)]
     pub(super) fn newest(&self, x: u32, y: u32) -> Option<usize> {
-        let samples = self.of_pixel(x, y).filter(|&i| !self.is_empty(i));
-        samples.reduce(|newest, i| {
+        self.newest_of(self.layout.of_pixel(x as i32, y as i32))
+    }
+
+    /// The same of the pixel with the first cell `first`.
+    #[inline(always)]
+    pub(super) fn newest_of(&self, first: usize) -> Option<usize> {
+        let cells = (0..self.layout.subs()).map(|sub| first + sub * self.layout.plane);
+        cells.filter(|&i| !self.is_empty(i)).reduce(|newest, i| {
             if Tick(self.tick[i]).is_later_than(Tick(self.tick[newest])) { i } else { newest }
         })
+    }
+
+    /// Of the cell `first` of pixel (x, y) and the seven to its right: whether there are samples at the pixels' centres.
+    #[inline(always)]
+    pub(super) fn are_central(&self, first: usize, x: u32, y: u32) -> M8 {
+        let is_sample = M8::load(&self.object, first).equals(M8::splat(EMPTY)).not();
+        let px = [F8::load(&self.px[0], first), F8::load(&self.px[1], first)];
+        let near = F8::splat(CENTRAL_PX * CENTRAL_PX);
+        is_sample.and(distance2(px, &centres(x, y)).less_than(near))
     }
 
     /// The cell of a sample at a pixel's centre.
@@ -279,11 +326,24 @@ impl Store {
     /// Puts a sample into its cell. `outdated`: the pixel's others show something that is no longer there.
     pub(super) fn insert(&mut self, sample: &Sample, outdated: bool) {
         let Some(i) = self.layout.of_px(sample.px) else { return };
-        let subs = (self.layout.per_side * self.layout.per_side) as usize;
+        let subs = self.layout.subs();
         if outdated && subs > 1 {
             let first = i % self.layout.plane;
             (0..subs).for_each(|sub| self.object[first + sub * self.layout.plane] = EMPTY);
         }
         self.set(i, sample);
     }
+}
+
+/// Of the eight pixels from (x, y) on.
+#[inline(always)]
+pub(super) fn centres(x: u32, y: u32) -> [F8; 2] {
+    let columns = M8::new([0, 1, 2, 3, 4, 5, 6, 7]).plus(M8::splat(x));
+    [columns.to_f32() + F8::splat(0.5), F8::splat(y as f32 + 0.5)]
+}
+
+#[inline(always)]
+pub(super) fn distance2(px: [F8; 2], centre: &[F8; 2]) -> F8 {
+    let (dx, dy) = (px[0] - centre[0], px[1] - centre[1]);
+    dx * dx + dy * dy
 }

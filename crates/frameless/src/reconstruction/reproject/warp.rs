@@ -1,10 +1,11 @@
-//! The forward step: every sample to where its surface is now.
+//! The forward step: every sample whose object moves goes to where its surface is now.
 //!
+//! The samples that move are lifted out of their cells, and put down again where they are now; all others stay where they are.
 //! Where two samples meet in a cell, the nearer one stays if it is nearer by 1.5 %. On the same surface the newer one stays, and
-//! the other moves to the neighbouring cell on its side, if that is empty; so it is with samples whose surface is not known. At last what is seen through the cracks between a nearer
-//! object's samples is taken away.
+//! the other moves to the neighbouring cell on its side, if that is empty; so it is with samples whose surface is not known. At
+//! last what is seen through the cracks between a nearer object's samples is taken away.
 
-use super::store::{Anchor, EMPTY, Layout, SCREEN, Store, surface};
+use super::store::{Anchor, EMPTY, Layout, SCREEN, Store};
 use crate::wide::{self, F8, M8};
 use crate::{Pose, Surface};
 
@@ -13,72 +14,136 @@ const SAME_SURFACE: f32 = 0.015;
 /// A neighbour nearer by more than this ratio covers what is behind it.
 const COVERS: f32 = 0.07;
 
-/// Scratch memory.
-#[derive(Default)]
-pub(super) struct Warp {
-    next: Option<Store>,
-    carried: Carried,
-    /// Per cell the old cell whose sample is here now.
-    winner: Vec<u32>,
-    losers: Vec<u32>,
-    moves: Vec<(u32, u32)>,
-    covered: Vec<u32>,
-}
-
-/// Where the samples are now.
-#[derive(Default)]
-struct Carried {
-    px: [Vec<f32>; 2],
-    depth: Vec<f32>,
-    /// The cell there.
-    cell: Vec<u32>,
-}
-
 /// The first cell lies in the border, so that no sample is ever there.
 const NOWHERE: u32 = 0;
 /// Neither inside a picture nor NaN.
 const GONE_PX: f32 = -1.0;
+/// The slot of a cell whose sample has been lifted.
+const NO_SLOT: u32 = u32::MAX;
+
+/// Rows that are lifted before the first of them is put down again. Few enough to lie in the cache, and enough that nearly all
+/// samples come to rows that have been lifted.
+const ROWS_AHEAD: usize = 8;
+
+/// Scratch memory.
+#[derive(Default)]
+pub(super) struct Warp {
+    /// The samples of one row in each, turn by turn.
+    lifted: [Row; ROWS_AHEAD],
+    /// Samples that came to a row that had not been lifted.
+    early: Vec<(u32, Mover)>,
+    losers: Vec<Mover>,
+    /// First cells of eights of which some have been lifted.
+    starts: Vec<u32>,
+    /// Slots of samples that are gone.
+    free: Vec<u32>,
+    covered: Vec<u32>,
+}
+
+#[derive(Default)]
+struct Row {
+    eights: Vec<Eight>,
+    len: usize,
+}
+
+/// Eight neighbouring cells, some of whose samples have been lifted.
+#[derive(Clone, Default)]
+struct Eight {
+    /// A bit per lane: whose sample moves.
+    lanes: u32,
+    /// Where it is now: the cell, [`NOWHERE`] outside the picture, the position in pixels, the depth.
+    cell: [u32; 8],
+    px: [[f32; 8]; 2],
+    depth: [f32; 8],
+    rgb: [[f32; 8]; 3],
+    tick: [u32; 8],
+    object: [u32; 8],
+    slot: [u32; 8],
+    anchor: [Anchor; 8],
+}
+
+/// One sample on its way.
+#[derive(Clone, Copy)]
+struct Mover {
+    px: [f32; 2],
+    depth: f32,
+    rgb: [f32; 3],
+    tick: u32,
+    object: u32,
+    slot: u32,
+    anchor: Anchor,
+}
+
+impl Eight {
+    #[inline(always)]
+    fn mover(&self, lane: usize) -> Mover {
+        Mover {
+            px: [self.px[0][lane], self.px[1][lane]],
+            depth: self.depth[lane],
+            rgb: [self.rgb[0][lane], self.rgb[1][lane], self.rgb[2][lane]],
+            tick: self.tick[lane],
+            object: self.object[lane],
+            slot: self.slot[lane],
+            anchor: self.anchor[lane],
+        }
+    }
+}
+
+impl Row {
+    #[inline(always)]
+    fn next(&mut self) -> &mut Eight {
+        if self.len == self.eights.len() {
+            self.eights.push(Eight::default());
+        }
+        self.len += 1;
+        &mut self.eights[self.len - 1]
+    }
+}
 
 impl Warp {
-    pub(super) fn run(&mut self, store: &mut Store, pose: &Pose) {
-        self.carry(store, pose);
-        self.settle(store);
-        self.rebuild(store);
+    /// `rests`: of an object number, whether its samples stay where they are.
+    pub(super) fn run(&mut self, store: &mut Store, pose: &Pose, rests: impl Fn(u32) -> bool) {
+        wide::run(Carry { warp: self, store, pose, rests });
+        self.put_down_early(store);
         self.step_aside(store);
+        self.give_back_slots(store);
     }
 
-    /// Where every sample's surface is now.
-    fn carry(&mut self, store: &Store, pose: &Pose) {
-        let Carried { px, depth, cell } = &mut self.carried;
-        for plane in px.iter_mut().chain([depth]) {
-            plane.resize(store.layout.len(), GONE_PX);
+    fn put_down_early(&mut self, store: &mut Store) {
+        let Warp { early, losers, free, .. } = self;
+        for (cell, mover) in early.drain(..) {
+            put_down(store, cell, &mover, losers, free);
         }
-        cell.resize(store.layout.len(), NOWHERE);
-        wide::run(Carry { store, pose, carried: &mut self.carried });
     }
 
-    /// Who gets each cell.
-    fn settle(&mut self, store: &Store) {
-        self.winner.clear();
-        self.winner.resize(store.layout.len(), NOWHERE);
-        self.losers.clear();
-        let Warp { carried, winner, losers, .. } = self;
-        wide::run(Settle { store, carried, winner, losers });
-    }
-
-    fn rebuild(&mut self, store: &mut Store) {
-        let next =
-            self.next.get_or_insert_with(|| Store::new(store.layout.size, store.layout.per_side));
-        if next.layout != store.layout {
-            *next = Store::new(store.layout.size, store.layout.per_side);
-        }
-        wide::run(Rebuild { store, carried: &self.carried, winner: &self.winner, next });
-        std::mem::swap(store, next);
-    }
-
+    /// Who lost its cell to a sample of the same surface goes to the one beside it, if that is empty.
     fn step_aside(&mut self, store: &mut Store) {
-        let Warp { next: Some(old), carried, losers, moves, .. } = self else { return };
-        wide::run(StepAside { old, carried, losers, moves, store });
+        let n = store.layout.per_side as f32;
+        for loser in self.losers.drain(..) {
+            // Positions in the picture are not negative.
+            let [fx, fy] = loser.px.map(|p| p * n - (p * n) as i32 as f32 - 0.5);
+            let sideways = fx.abs() > fy.abs();
+            let dx = if sideways { fx.signum() / n } else { 0.0 };
+            let dy = if sideways { 0.0 } else { fy.signum() / n };
+            let beside = store.layout.of_px([loser.px[0] + dx, loser.px[1] + dy]);
+            match beside.filter(|&cell| store.is_empty(cell)) {
+                Some(cell) => put(store, cell, &loser, &mut self.free),
+                None => self.free.push(loser.slot),
+            }
+        }
+    }
+
+    /// Every cell has a slot again.
+    fn give_back_slots(&mut self, store: &mut Store) {
+        for start in self.starts.drain(..) {
+            let start = start as usize;
+            for slot in &mut store.slot[start..start + 8] {
+                if *slot == NO_SLOT {
+                    *slot = self.free.pop().expect("as many slots as cells");
+                }
+            }
+        }
+        debug_assert!(self.free.is_empty());
     }
 
     /// After [`Warp::run`]: what is seen between a nearer object's samples.
@@ -91,10 +156,27 @@ impl Warp {
     }
 }
 
-struct Carry<'a> {
-    store: &'a Store,
+struct Carry<'a, F> {
+    warp: &'a mut Warp,
+    store: &'a mut Store,
     pose: &'a Pose,
-    carried: &'a mut Carried,
+    rests: F,
+}
+
+impl<F: Fn(u32) -> bool> wide::Task for Carry<'_, F> {
+    #[inline(always)]
+    fn run(mut self) {
+        let rows = self.store.layout.size.height as usize;
+        for row in 0..rows + ROWS_AHEAD {
+            // Whose turn it is to be lifted next is put down first.
+            if row >= ROWS_AHEAD {
+                self.put_down_row(row % ROWS_AHEAD, row.min(rows) as i32);
+            }
+            if row < rows {
+                self.lift_row(row as i32);
+            }
+        }
+    }
 }
 
 /// Where eight samples are.
@@ -103,44 +185,91 @@ struct There {
     depth: F8,
 }
 
-impl wide::Task for Carry<'_> {
+impl<F: Fn(u32) -> bool> Carry<'_, F> {
     #[inline(always)]
-    fn run(self) {
-        let Carry { store, pose, carried: Carried { px: [px, py], depth, cell } } = self;
-        for start in (0..store.layout.len()).step_by(8) {
-            let objects = M8::load(&store.object, start);
-            let mut waiting = objects.equals(M8::splat(EMPTY)).not();
-            if !waiting.any() {
-                M8::splat(NOWHERE).store(cell, start);
-                continue;
+    fn lift_row(&mut self, y: i32) {
+        let turn = y as usize % ROWS_AHEAD;
+        self.warp.lifted[turn].len = 0;
+        let Layout { size, plane, .. } = self.store.layout;
+        for sub in 0..self.store.layout.subs() {
+            for x in (0..size.width as i32).step_by(8) {
+                let start = self.store.layout.of_pixel(x, y) + sub * plane;
+                self.lift_eight(start, turn);
             }
-            let anchors = coordinates(&store.anchor[start..start + 8]);
-            let gone = F8::splat(GONE_PX);
-            let mut there = There { px: [gone; 2], depth: gone };
-            while let Some(lane) = waiting.first() {
-                let object = store.object[start + lane];
-                let same = objects.equals(M8::splat(object));
-                waiting = waiting.and(same.not());
-                let now = carry_eight(store, pose, object, start, anchors);
-                there.px = [now.px[0].or(same, there.px[0]), now.px[1].or(same, there.px[1])];
+        }
+    }
+
+    #[inline(always)]
+    fn lift_eight(&mut self, start: usize, turn: usize) {
+        let objects = M8::load(&self.store.object, start);
+        let mut waiting = objects.equals(M8::splat(EMPTY)).not();
+        let mut moving = M8::splat(0);
+        let gone = F8::splat(GONE_PX);
+        let mut there = There { px: [gone; 2], depth: gone };
+        while let Some(lane) = waiting.first() {
+            let object = self.store.object[start + lane];
+            let same = objects.equals(M8::splat(object));
+            waiting = waiting.and(same.not());
+            if !(self.rests)(object) {
+                moving = moving.either(same);
+                let now = carry_eight(self.store, self.pose, object, start);
+                there.px = [0, 1].map(|k| now.px[k].or(same, there.px[k]));
                 there.depth = now.depth.or(same, there.depth);
             }
-            there.px[0].store(px, start);
-            there.px[1].store(py, start);
-            there.depth.store(depth, start);
-            cells_at(&store.layout, there.px).store(cell, start);
+        }
+        if moving.any() {
+            self.warp.starts.push(start as u32);
+            lift(self.store, start, moving, &there, self.warp.lifted[turn].next());
+        }
+    }
+
+    /// `lifted_rows`: so many have been lifted.
+    #[inline(always)]
+    fn put_down_row(&mut self, turn: usize, lifted_rows: i32) {
+        let Warp { lifted, early, losers, free, .. } = &mut *self.warp;
+        let store = &mut *self.store;
+        let end = store.layout.of_pixel(0, lifted_rows) as u32 - 1;
+        let plane = store.layout.plane as u32;
+        let row = &lifted[turn];
+        for eight in &row.eights[..row.len] {
+            let mut lanes = eight.lanes;
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize;
+                lanes &= lanes - 1;
+                let (cell, mover) = (eight.cell[lane], eight.mover(lane));
+                let in_plane = if cell < plane { cell } else { cell % plane };
+                match in_plane < end {
+                    true => put_down(store, cell, &mover, losers, free),
+                    false => early.push((cell, mover)),
+                }
+            }
         }
     }
 }
 
+/// Takes the samples that are `moving` out of their cells.
+#[inline(always)]
+fn lift(store: &mut Store, start: usize, moving: M8, there: &There, eight: &mut Eight) {
+    let (object, slot) = (M8::load(&store.object, start), M8::load(&store.slot, start));
+    M8::splat(EMPTY).or(moving, object).store(&mut store.object, start);
+    M8::splat(NO_SLOT).or(moving, slot).store(&mut store.slot, start);
+    eight.lanes = moving.bits();
+    eight.cell = cells_at(&store.layout, there.px).lanes();
+    eight.px = there.px.map(F8::lanes);
+    eight.depth = there.depth.lanes();
+    for (rgb, plane) in eight.rgb.iter_mut().zip(&store.rgb) {
+        rgb.copy_from_slice(&plane[start..start + 8]);
+    }
+    eight.tick.copy_from_slice(&store.tick[start..start + 8]);
+    eight.object = object.lanes();
+    eight.slot = slot.lanes();
+    eight.anchor.copy_from_slice(&store.anchor[start..start + 8]);
+}
+
 /// The eight samples from `start` on, as if all were of the same object.
 #[inline(always)]
-fn carry_eight(store: &Store, pose: &Pose, object: u32, start: usize, anchors: [F8; 3]) -> There {
+fn carry_eight(store: &Store, pose: &Pose, object: u32, start: usize) -> There {
     let gone = F8::splat(GONE_PX);
-    if object == SCREEN {
-        let px = [F8::load(&store.px[0], start), F8::load(&store.px[1], start)];
-        return There { px, depth: F8::splat(f32::INFINITY) };
-    }
     if matches!(pose.deformed.get(object as usize), Some(Some(_))) {
         return carry_deformed(store, pose, object, start);
     }
@@ -149,7 +278,8 @@ fn carry_eight(store: &Store, pose: &Pose, object: u32, start: usize, anchors: [
         object => pose.picture_from_object.get(object as usize),
     };
     let Some(projection) = projection else { return There { px: [gone; 2], depth: gone } };
-    let [x, y, z] = anchors;
+    let (anchors, _) = store.anchor[start..start + 8].as_chunks::<8>();
+    let [x, y, z, _] = F8::columns(anchors[0].each_ref().map(|anchor| &anchor.0));
     let row = |k: usize| {
         let [a, b, c, d] = projection.0[k].map(F8::splat);
         a * x + b * y + (c * z + d)
@@ -168,7 +298,7 @@ fn carry_deformed(store: &Store, pose: &Pose, object: u32, start: usize) -> Ther
     let (mut px, mut depth) = ([[GONE_PX; 8]; 2], [GONE_PX; 8]);
     for lane in 0..8 {
         if store.object[start + lane] == object
-            && let Some(now) = pose.project(&surface(object, &store.anchor[start + lane]))
+            && let Some(now) = pose.project(&store.surface(start + lane))
         {
             (0..2).for_each(|k| px[k][lane] = now.px[k]);
             depth[lane] = now.depth;
@@ -201,132 +331,64 @@ fn cells_at(layout: &Layout, px: [F8; 2]) -> M8 {
     cell.or(inside, M8::splat(NOWHERE))
 }
 
-/// x, y and z of eight points.
+/// One sample to its new cell, if it stays there.
 #[inline(always)]
-fn coordinates(anchors: &[Anchor]) -> [F8; 3] {
-    let mut planes = [[0.0; 8]; 3];
-    for (lane, anchor) in anchors.iter().enumerate() {
-        for (plane, &coordinate) in planes.iter_mut().zip(&anchor.position) {
-            plane[lane] = coordinate;
-        }
+fn put_down(
+    store: &mut Store,
+    cell: u32,
+    mover: &Mover,
+    losers: &mut Vec<Mover>,
+    free: &mut Vec<u32>,
+) {
+    let cell = cell as usize;
+    if cell == NOWHERE as usize {
+        return free.push(mover.slot);
     }
-    planes.map(F8::new)
-}
-
-struct Settle<'a> {
-    store: &'a Store,
-    carried: &'a Carried,
-    winner: &'a mut [u32],
-    losers: &'a mut Vec<u32>,
-}
-
-impl wide::Task for Settle<'_> {
-    #[inline(always)]
-    fn run(self) {
-        let Settle { store, carried, winner, losers } = self;
-        for (i, &cell) in (0..).zip(&carried.cell) {
-            if cell == NOWHERE {
-                continue;
-            }
-            let there = winner[cell as usize];
-            winner[cell as usize] =
-                if there == NOWHERE { i } else { meet(store, &carried.depth, there, i, losers) };
-        }
+    if store.is_empty(cell) {
+        return put(store, cell, mover, free);
+    }
+    let there = store.depth[cell];
+    let on_screen = store.object[cell] == SCREEN;
+    if !on_screen && mover.depth < there * (1.0 - SAME_SURFACE) {
+        return put(store, cell, mover, free);
+    }
+    if !on_screen && mover.depth > there * (1.0 + SAME_SURFACE) {
+        return free.push(mover.slot);
+    }
+    if mover.tick.wrapping_sub(store.tick[cell]) as i32 > 0 {
+        losers.push(take(store, cell));
+        put(store, cell, mover, free);
+    } else {
+        losers.push(*mover);
     }
 }
 
-/// Who stays where sample `i` comes to where `there` is already.
+/// The sample in a cell, which then has no slot.
 #[inline(always)]
-fn meet(store: &Store, depths: &[f32], there: u32, i: u32, losers: &mut Vec<u32>) -> u32 {
-    let (a, b) = (i as usize, there as usize);
-    let (depth, other) = (depths[a], depths[b]);
-    let on_screen = store.object[a] == SCREEN || store.object[b] == SCREEN;
-    if !on_screen && depth < other * (1.0 - SAME_SURFACE) {
-        return i;
-    }
-    if !on_screen && depth > other * (1.0 + SAME_SURFACE) {
-        return there;
-    }
-    let is_newer = store.tick[a].wrapping_sub(store.tick[b]) as i32 > 0;
-    let (winner, loser) = if is_newer { (i, there) } else { (there, i) };
-    losers.push(loser);
-    winner
-}
-
-struct Rebuild<'a> {
-    store: &'a Store,
-    carried: &'a Carried,
-    winner: &'a [u32],
-    next: &'a mut Store,
-}
-
-/// Cells that are moved plane by plane before the next ones are: so many lie in the first-level cache.
-const CACHED: usize = 256;
-
-impl wide::Task for Rebuild<'_> {
-    #[inline(always)]
-    fn run(self) {
-        let Rebuild { store, carried, winner, next } = self;
-        for (start, from) in (0..).step_by(CACHED).zip(winner.chunks(CACHED)) {
-            let cells = start..start + from.len();
-            for k in 0..3 {
-                wide::gather(&mut next.rgb[k][cells.clone()], &store.rgb[k], from);
-            }
-            for k in 0..2 {
-                wide::gather(&mut next.px[k][cells.clone()], &carried.px[k], from);
-            }
-            wide::gather(&mut next.depth[cells.clone()], &carried.depth, from);
-            wide::gather(&mut next.tick[cells.clone()], &store.tick, from);
-            // Nobody is at `NOWHERE`: where nobody comes to, the cell is empty.
-            wide::gather(&mut next.object[cells.clone()], &store.object, from);
-            wide::gather(&mut next.anchor[cells.clone()], &store.anchor, from);
-            wide::gather(&mut next.shade[cells], &store.shade, from);
-        }
+fn take(store: &mut Store, cell: usize) -> Mover {
+    Mover {
+        px: [store.px[0][cell], store.px[1][cell]],
+        depth: store.depth[cell],
+        rgb: [store.rgb[0][cell], store.rgb[1][cell], store.rgb[2][cell]],
+        tick: store.tick[cell],
+        object: store.object[cell],
+        slot: std::mem::replace(&mut store.slot[cell], NO_SLOT),
+        anchor: store.anchor[cell],
     }
 }
 
-struct StepAside<'a> {
-    old: &'a Store,
-    carried: &'a Carried,
-    losers: &'a [u32],
-    /// Who goes where.
-    moves: &'a mut Vec<(u32, u32)>,
-    store: &'a mut Store,
-}
-
-impl wide::Task for StepAside<'_> {
-    #[inline(always)]
-    fn run(self) {
-        let StepAside { old, carried, losers, moves, store } = self;
-        moves.clear();
-        let n = store.layout.per_side as f32;
-        for &loser in losers {
-            let i = loser as usize;
-            let px = [carried.px[0][i], carried.px[1][i]];
-            let [fx, fy] = px.map(|p| (p * n).fract() - 0.5);
-            let sideways = fx.abs() > fy.abs();
-            let dx = if sideways { fx.signum() / n } else { 0.0 };
-            let dy = if sideways { 0.0 } else { fy.signum() / n };
-            if let Some(cell) = store.layout.of_px([px[0] + dx, px[1] + dy])
-                && store.is_empty(cell)
-            {
-                store.object[cell] = old.object[i];
-                moves.push((loser, cell as u32));
-            }
-        }
-        (0..3).for_each(|k| scatter(moves, &old.rgb[k], &mut store.rgb[k]));
-        (0..2).for_each(|k| scatter(moves, &carried.px[k], &mut store.px[k]));
-        scatter(moves, &carried.depth, &mut store.depth);
-        scatter(moves, &old.tick, &mut store.tick);
-        scatter(moves, &old.anchor, &mut store.anchor);
-        scatter(moves, &old.shade, &mut store.shade);
-    }
-}
-
+/// Into a cell, instead of who is there.
 #[inline(always)]
-fn scatter<T: Copy>(moves: &[(u32, u32)], from: &[T], into: &mut [T]) {
-    for &(source, cell) in moves {
-        into[cell as usize] = from[source as usize];
+fn put(store: &mut Store, cell: usize, mover: &Mover, free: &mut Vec<u32>) {
+    [store.px[0][cell], store.px[1][cell]] = mover.px;
+    store.depth[cell] = mover.depth;
+    (0..3).for_each(|k| store.rgb[k][cell] = mover.rgb[k]);
+    store.tick[cell] = mover.tick;
+    store.object[cell] = mover.object;
+    store.anchor[cell] = mover.anchor;
+    let before = std::mem::replace(&mut store.slot[cell], mover.slot);
+    if before != NO_SLOT {
+        free.push(before);
     }
 }
 
