@@ -1,22 +1,18 @@
-//! Loops over plain numbers, compiled for the vector unit of the processor at hand. The one place of this crate with `unsafe` code.
+//! Loops over plain numbers, eight at a time, compiled for the vector unit of the processor at hand. The one place of this crate
+//! with `unsafe` code.
 //!
 //! The results do not depend on it: every lane does the same IEEE operations, and nothing is contracted.
 #![allow(unsafe_code)]
 
-#[cfg(not(target_arch = "x86_64"))]
+#[cfg(target_arch = "x86_64")]
+mod avx2;
 mod portable;
-#[cfg(target_arch = "x86_64")]
-mod sse2;
 
-#[cfg(not(target_arch = "x86_64"))]
-use portable::{F4, M4};
-#[cfg(target_arch = "x86_64")]
-use sse2::{F4, M4};
-
-/// A loop to be compiled twice.
+/// A loop to be compiled for every unit.
 pub(crate) trait Task {
-    /// Must be `inline(always)`, and so must what its inner loop calls.
-    fn run(self);
+    /// Must be `inline(always)`, and so must what its inner loop calls: code that stays a function of its own, like the closures
+    /// given to `array::map`, is compiled for no unit in particular.
+    fn run<U: Unit>(self);
 }
 
 /// Runs `task`, with AVX2 where the processor has it.
@@ -25,183 +21,206 @@ pub(crate) fn run(task: impl Task) {
     if is_x86_feature_detected!("avx2") {
         #[target_feature(enable = "avx2")]
         fn run_avx2(task: impl Task) {
-            task.run()
+            task.run::<avx2::Avx2>()
         }
         // SAFETY: the processor has just been asked.
         return unsafe { run_avx2(task) };
     }
-    task.run()
+    task.run::<portable::Portable>()
+}
+
+/// What a vector unit does with eight numbers, `F`, or eight whole numbers or masks, `M`; see [`F8`] and [`M8`].
+pub(crate) trait Unit: Copy {
+    type F: Copy;
+    type M: Copy;
+    fn splat_f(x: f32) -> Self::F;
+    fn load_f(lanes: &[f32; 8]) -> Self::F;
+    fn store_f(a: Self::F, lanes: &mut [f32; 8]);
+    fn columns(rows: [&[f32; 4]; 8]) -> [Self::F; 4];
+    fn add_f(a: Self::F, b: Self::F) -> Self::F;
+    fn sub_f(a: Self::F, b: Self::F) -> Self::F;
+    fn mul_f(a: Self::F, b: Self::F) -> Self::F;
+    fn div_f(a: Self::F, b: Self::F) -> Self::F;
+    fn less_than_f(a: Self::F, b: Self::F) -> Self::M;
+    fn select_f(mask: Self::M, a: Self::F, b: Self::F) -> Self::F;
+    fn truncated(a: Self::F) -> Self::M;
+    fn splat_m(x: u32) -> Self::M;
+    fn load_m(lanes: &[u32; 8]) -> Self::M;
+    fn store_m(a: Self::M, lanes: &mut [u32; 8]);
+    fn equals(a: Self::M, b: Self::M) -> Self::M;
+    fn less_than_m(a: Self::M, b: Self::M) -> Self::M;
+    fn and(a: Self::M, b: Self::M) -> Self::M;
+    fn either(a: Self::M, b: Self::M) -> Self::M;
+    fn plus(a: Self::M, b: Self::M) -> Self::M;
+    fn minus(a: Self::M, b: Self::M) -> Self::M;
+    fn times(a: Self::M, b: Self::M) -> Self::M;
+    fn to_f32(a: Self::M) -> Self::F;
+    fn bits(a: Self::M) -> u32;
 }
 
 /// Eight numbers at a time.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct F8([F4; 2]);
+#[derive(Clone, Copy)]
+pub(crate) struct F8<U: Unit>(U::F);
 
 /// Eight whole numbers at a time; as a mask, all bits of a lane are set or none.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct M8([M4; 2]);
+#[derive(Clone, Copy)]
+pub(crate) struct M8<U: Unit>(U::M);
 
-/// Half by half.
-macro_rules! both {
-    ($operation:expr, $a:expr $(, $b:expr)*) => {
-        [$operation($a.0[0] $(, $b.0[0])*), $operation($a.0[1] $(, $b.0[1])*)]
-    };
-}
-
-impl F8 {
+impl<U: Unit> F8<U> {
     #[inline(always)]
-    pub(crate) fn splat(x: f32) -> F8 {
-        F8([F4::splat(x); 2])
+    pub(crate) fn splat(x: f32) -> Self {
+        F8(U::splat_f(x))
     }
 
     #[inline(always)]
-    pub(crate) fn new([a, b, c, d, e, f, g, h]: [f32; 8]) -> F8 {
-        F8([F4::new([a, b, c, d]), F4::new([e, f, g, h])])
+    pub(crate) fn new(lanes: [f32; 8]) -> Self {
+        F8(U::load_f(&lanes))
     }
 
     #[inline(always)]
     pub(crate) fn lanes(self) -> [f32; 8] {
         let mut lanes = [0.0; 8];
-        self.store(&mut lanes, 0);
+        U::store_f(self.0, &mut lanes);
         lanes
     }
 
     /// The eight from `start` on.
     #[inline(always)]
-    pub(crate) fn load(plane: &[f32], start: usize) -> F8 {
-        let [low, high] = halves(&plane[start..start + 8]);
-        F8([F4::load(low), F4::load(high)])
-    }
-
-    #[inline(always)]
-    pub(crate) fn store(self, plane: &mut [f32], start: usize) {
-        let plane = &mut plane[start..start + 8];
-        plane[..4].copy_from_slice(&self.0[0].lanes());
-        plane[4..].copy_from_slice(&self.0[1].lanes());
+    pub(crate) fn load(plane: &[f32], start: usize) -> Self {
+        F8(U::load_f(&plane[start..start + 8].as_chunks().0[0]))
     }
 
     /// `self` where the mask is set, `other` elsewhere.
     #[inline(always)]
-    pub(crate) fn or(self, mask: M8, other: F8) -> F8 {
-        F8(both!(F4::or, self, mask, other))
+    pub(crate) fn or(self, mask: M8<U>, other: Self) -> Self {
+        F8(U::select_f(mask.0, self.0, other.0))
+    }
+
+    /// [`F8::or`] of several.
+    #[inline(always)]
+    pub(crate) fn all_or<const N: usize>(
+        mut some: [Self; N],
+        mask: M8<U>,
+        others: [Self; N],
+    ) -> [Self; N] {
+        for (some, other) in some.iter_mut().zip(others) {
+            *some = some.or(mask, other);
+        }
+        some
     }
 
     #[inline(always)]
-    pub(crate) fn less_than(self, other: F8) -> M8 {
-        M8(both!(F4::less_than, self, other))
+    pub(crate) fn less_than(self, other: Self) -> M8<U> {
+        M8(U::less_than_f(self.0, other.0))
     }
 
     /// The columns of eight rows of four.
     #[inline(always)]
-    pub(crate) fn columns(rows: [&[f32; 4]; 8]) -> [F8; 4] {
-        let [a, b, c, d, e, f, g, h] = rows;
-        let (low, high) = (F4::transposed([a, b, c, d]), F4::transposed([e, f, g, h]));
-        [0, 1, 2, 3].map(|k| F8([low[k], high[k]]))
+    pub(crate) fn columns(rows: [&[f32; 4]; 8]) -> [Self; 4] {
+        let [a, b, c, d] = U::columns(rows);
+        [F8(a), F8(b), F8(c), F8(d)]
     }
 
     /// Towards zero. Numbers that are not in 0..2³¹ give something.
     #[inline(always)]
-    pub(crate) fn truncated(self) -> M8 {
-        M8(both!(F4::truncated, self))
+    pub(crate) fn truncated(self) -> M8<U> {
+        M8(U::truncated(self.0))
     }
 }
 
 macro_rules! lane_by_lane {
-    ($($trait:ident $method:ident),*) => {$(
-        impl std::ops::$trait for F8 {
-            type Output = F8;
+    ($($trait:ident $method:ident $operation:ident),*) => {$(
+        impl<U: Unit> std::ops::$trait for F8<U> {
+            type Output = Self;
             #[inline(always)]
-            fn $method(self, other: F8) -> F8 {
-                F8(both!(F4::$method, self, other))
+            fn $method(self, other: Self) -> Self {
+                F8(U::$operation(self.0, other.0))
             }
         }
     )*};
 }
-lane_by_lane!(Add add, Sub sub, Mul mul, Div div);
+lane_by_lane!(Add add add_f, Sub sub sub_f, Mul mul mul_f, Div div div_f);
 
 macro_rules! whole_lane_by_lane {
-    ($($(#[$doc:meta])* $method:ident),* $(,)?) => {$(
+    ($($(#[$doc:meta])* $method:ident $operation:ident),* $(,)?) => {$(
         $(#[$doc])*
         #[inline(always)]
-        pub(crate) fn $method(self, other: M8) -> M8 {
-            M8(both!(M4::$method, self, other))
+        pub(crate) fn $method(self, other: Self) -> Self {
+            M8(U::$operation(self.0, other.0))
         }
     )*};
 }
 
-impl M8 {
+impl<U: Unit> M8<U> {
     #[inline(always)]
-    pub(crate) fn splat(x: u32) -> M8 {
-        M8([M4::splat(x); 2])
+    pub(crate) fn splat(x: u32) -> Self {
+        M8(U::splat_m(x))
     }
 
     #[inline(always)]
-    pub(crate) fn new(lanes: [u32; 8]) -> M8 {
-        M8::load(&lanes, 0)
+    pub(crate) fn new(lanes: [u32; 8]) -> Self {
+        M8(U::load_m(&lanes))
     }
 
     #[inline(always)]
     pub(crate) fn lanes(self) -> [u32; 8] {
         let mut lanes = [0; 8];
-        self.store(&mut lanes, 0);
+        U::store_m(self.0, &mut lanes);
         lanes
     }
 
     /// The eight from `start` on.
     #[inline(always)]
-    pub(crate) fn load(plane: &[u32], start: usize) -> M8 {
-        let [low, high] = halves(&plane[start..start + 8]);
-        M8([M4::load(low), M4::load(high)])
+    pub(crate) fn load(plane: &[u32], start: usize) -> Self {
+        M8(U::load_m(&plane[start..start + 8].as_chunks().0[0]))
     }
 
     #[inline(always)]
     pub(crate) fn store(self, plane: &mut [u32], start: usize) {
-        let plane = &mut plane[start..start + 8];
-        plane[..4].copy_from_slice(&self.0[0].lanes());
-        plane[4..].copy_from_slice(&self.0[1].lanes());
+        U::store_m(self.0, &mut plane[start..start + 8].as_chunks_mut().0[0]);
     }
 
     whole_lane_by_lane!(
-        equals,
+        equals equals,
         /// As signed numbers.
-        less_than,
-        and,
-        either,
+        less_than less_than_m,
+        and and,
+        either either,
         /// Sum modulo 2³².
-        plus,
+        plus plus,
         /// Difference modulo 2³².
-        minus,
+        minus minus,
         /// Product modulo 2³².
-        times,
+        times times,
     );
 
     #[inline(always)]
-    pub(crate) fn not(self) -> M8 {
+    pub(crate) fn not(self) -> Self {
         self.equals(M8::splat(0))
     }
 
     /// As signed numbers.
     #[inline(always)]
-    pub(crate) fn to_f32(self) -> F8 {
-        F8(both!(M4::to_f32, self))
+    pub(crate) fn to_f32(self) -> F8<U> {
+        F8(U::to_f32(self.0))
     }
 
     /// `self` where the mask is set, `other` elsewhere.
     #[inline(always)]
-    pub(crate) fn or(self, mask: M8, other: M8) -> M8 {
+    pub(crate) fn or(self, mask: Self, other: Self) -> Self {
         self.and(mask).either(mask.not().and(other))
     }
 
     /// A mask of the first lanes.
     #[inline(always)]
-    pub(crate) fn first_lanes(lanes: usize) -> M8 {
+    pub(crate) fn first_lanes(lanes: usize) -> Self {
         M8::new([0, 1, 2, 3, 4, 5, 6, 7]).less_than(M8::splat(lanes as u32))
     }
 
     /// A bit per lane of a mask.
     #[inline(always)]
     pub(crate) fn bits(self) -> u32 {
-        self.0[0].bits() | self.0[1].bits() << 4
+        U::bits(self.0)
     }
 
     /// Whether all lanes of a mask are set.
@@ -234,12 +253,6 @@ impl M8 {
     }
 }
 
-#[inline(always)]
-fn halves<T>(eight: &[T]) -> [&[T; 4]; 2] {
-    let (halves, _) = eight.as_chunks::<4>();
-    [&halves[0], &halves[1]]
-}
-
 /// Planes of equal length, of which eight numbers at a time are read from the same place: one check for all.
 #[derive(Clone, Copy)]
 pub(crate) struct Planes<'a, T, const N: usize> {
@@ -257,35 +270,110 @@ impl<'a, T, const N: usize> Planes<'a, T, N> {
     fn eights(&self, start: usize) -> [&'a [T]; N] {
         assert!(start < self.len && self.len - start >= 8);
         // SAFETY: no plane is shorter than `len`, and eight numbers from `start` on are within it.
-        std::array::from_fn(|k| unsafe { self.planes[k].get_unchecked(start..start + 8) })
+        let mut eights = self.planes;
+        for eight in &mut eights {
+            *eight = unsafe { eight.get_unchecked(start..start + 8) };
+        }
+        eights
     }
 }
 
 impl<const N: usize> Planes<'_, f32, N> {
     /// The eight from `start` on, of every plane.
     #[inline(always)]
-    pub(crate) fn load(&self, start: usize) -> [F8; N] {
-        self.eights(start).map(|eight| F8::load(eight, 0))
+    pub(crate) fn load<U: Unit>(&self, start: usize) -> [F8<U>; N] {
+        let (eights, mut loaded) = (self.eights(start), [F8::splat(0.0); N]);
+        for (loaded, eight) in loaded.iter_mut().zip(eights) {
+            *loaded = F8::load(eight, 0);
+        }
+        loaded
     }
 }
 
 impl<const N: usize> Planes<'_, u32, N> {
     /// The eight from `start` on, of every plane.
     #[inline(always)]
-    pub(crate) fn load(&self, start: usize) -> [M8; N] {
-        self.eights(start).map(|eight| M8::load(eight, 0))
+    pub(crate) fn load<U: Unit>(&self, start: usize) -> [M8<U>; N] {
+        let (eights, mut loaded) = (self.eights(start), [M8::splat(0); N]);
+        for (loaded, eight) in loaded.iter_mut().zip(eights) {
+            *loaded = M8::load(eight, 0);
+        }
+        loaded
     }
 }
 
-/// Begin to fetch `plane[i]` from memory, if there is such; it will be read soon.
+/// Begin to fetch `plane[i]` from memory; it will be read soon. Does nothing if there is no such.
 #[inline(always)]
 pub(crate) fn prefetch<T>(plane: &[T], i: usize) {
     #[cfg(target_arch = "x86_64")]
-    if let Some(place) = plane.get(i) {
+    {
         use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        // SAFETY: every x86-64 processor has SSE, and prefetching changes nothing.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(place).cast()) };
+        // SAFETY: every x86-64 processor has SSE; prefetching changes nothing, and never fails whatever the address.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(plane.as_ptr().wrapping_add(i).cast()) };
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = (plane, i);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Rng;
+
+    /// Everything that a unit can do with eight lanes of each kind, bit by bit.
+    struct All<'a> {
+        numbers: [[f32; 8]; 2],
+        wholes: [[u32; 8]; 2],
+        results: &'a mut Vec<[u32; 8]>,
+    }
+
+    impl Task for All<'_> {
+        #[inline(always)]
+        fn run<U: Unit>(self) {
+            let [a, b] = self.numbers.map(F8::<U>::new);
+            let [m, n] = self.wholes.map(M8::<U>::new);
+            let mask = a.less_than(b);
+            let numbers = [a + b, a - b, a * b, a / b, a.or(mask, b), m.to_f32()];
+            let rows: [&[f32; 4]; 8] = std::array::from_fn(|k| {
+                self.numbers[k % 2][k / 4 * 4..].first_chunk().expect("four are left")
+            });
+            let bits = |x: F8<U>| x.lanes().map(f32::to_bits);
+            self.results.extend(numbers.into_iter().chain(F8::columns(rows)).map(bits));
+            let wholes = [
+                mask,
+                a.truncated(),
+                m.equals(n),
+                m.less_than(n),
+                m.and(n),
+                m.either(n),
+                m.plus(n),
+                m.minus(n),
+                m.times(n),
+                m.or(mask, n),
+                m.not(),
+                M8::first_lanes(3),
+            ];
+            self.results.extend(wholes.map(M8::lanes));
+            self.results.push([mask.bits(), mask.first().unwrap_or(8) as u32, 0, 0, 0, 0, 0, 0]);
+        }
+    }
+
+    #[test]
+    fn every_unit_has_the_same_results() {
+        let mut rng = Rng::new(1);
+        for _ in 0..100 {
+            let mut number = || 2000.0 * rng.unit_f32();
+            let numbers = [(); 2].map(|()| std::array::from_fn(|_| number()));
+            // Half of them alike in both.
+            let mut whole = |k: u32| if k % 2 == 0 { k } else { rng.next_u32() };
+            let wholes = [(); 2].map(|()| std::array::from_fn(|k| whole(k as u32)));
+            let (mut portable, mut here) = (Vec::new(), Vec::new());
+            All { numbers, wholes, results: &mut portable }.run::<portable::Portable>();
+            run(All { numbers, wholes, results: &mut here });
+            assert_eq!(portable, here);
+            // By hand, so that not both are wrong alike.
+            assert_eq!(f32::from_bits(here[0][3]), numbers[0][3] + numbers[1][3]);
+            assert_eq!(here[14], std::array::from_fn(|k| wholes[0][k] & wholes[1][k]));
+        }
+    }
 }

@@ -1,135 +1,136 @@
-//! Four lanes as an array, for the compiler to do its best with.
+//! Arrays, for the compiler to do its best with.
 
-#[derive(Clone, Copy, Debug)]
-pub(super) struct F4([f32; 4]);
+use super::Unit;
 
-#[derive(Clone, Copy, Debug)]
-pub(super) struct M4([u32; 4]);
+/// Any processor.
+#[derive(Clone, Copy)]
+pub(crate) struct Portable;
 
 fn mask(is_set: bool) -> u32 {
     u32::from(is_set).wrapping_neg()
 }
 
-impl F4 {
-    #[inline(always)]
-    pub(super) fn splat(x: f32) -> F4 {
-        F4([x; 4])
-    }
-
-    #[inline(always)]
-    pub(super) fn new(lanes: [f32; 4]) -> F4 {
-        F4(lanes)
-    }
-
-    #[inline(always)]
-    pub(super) fn load(lanes: &[f32; 4]) -> F4 {
-        F4(*lanes)
-    }
-
-    #[inline(always)]
-    pub(super) fn transposed(rows: [&[f32; 4]; 4]) -> [F4; 4] {
-        std::array::from_fn(|k| F4(rows.map(|row| row[k])))
-    }
-
-    #[inline(always)]
-    pub(super) fn lanes(self) -> [f32; 4] {
-        self.0
-    }
-
-    #[inline(always)]
-    pub(super) fn less_than(self, other: F4) -> M4 {
-        M4(std::array::from_fn(|k| mask(self.0[k] < other.0[k])))
-    }
-
-    #[inline(always)]
-    pub(super) fn truncated(self) -> M4 {
-        M4(std::array::from_fn(|k| self.0[k] as i32 as u32))
-    }
-
-    #[inline(always)]
-    pub(super) fn or(self, mask: M4, other: F4) -> F4 {
-        F4(std::array::from_fn(|k| if mask.0[k] == 0 { other.0[k] } else { self.0[k] }))
-    }
-
-    #[inline(always)]
-    pub(super) fn add(self, other: F4) -> F4 {
-        F4(std::array::from_fn(|k| self.0[k] + other.0[k]))
-    }
-
-    #[inline(always)]
-    pub(super) fn sub(self, other: F4) -> F4 {
-        F4(std::array::from_fn(|k| self.0[k] - other.0[k]))
-    }
-
-    #[inline(always)]
-    pub(super) fn mul(self, other: F4) -> F4 {
-        F4(std::array::from_fn(|k| self.0[k] * other.0[k]))
-    }
-
-    #[inline(always)]
-    pub(super) fn div(self, other: F4) -> F4 {
-        F4(std::array::from_fn(|k| self.0[k] / other.0[k]))
-    }
+#[inline(always)]
+fn lanes<A: Copy, B: Copy, C>(a: [A; 8], b: [B; 8], operation: impl Fn(A, B) -> C) -> [C; 8] {
+    std::array::from_fn(|k| operation(a[k], b[k]))
 }
 
-impl M4 {
+impl Unit for Portable {
+    type F = [f32; 8];
+    type M = [u32; 8];
+
     #[inline(always)]
-    pub(super) fn splat(x: u32) -> M4 {
-        M4([x; 4])
+    fn splat_f(x: f32) -> [f32; 8] {
+        [x; 8]
     }
 
     #[inline(always)]
-    pub(super) fn load(lanes: &[u32; 4]) -> M4 {
-        M4(*lanes)
+    fn load_f(lanes: &[f32; 8]) -> [f32; 8] {
+        *lanes
     }
 
     #[inline(always)]
-    pub(super) fn lanes(self) -> [u32; 4] {
-        self.0
+    fn store_f(a: [f32; 8], lanes: &mut [f32; 8]) {
+        *lanes = a;
     }
 
     #[inline(always)]
-    pub(super) fn equals(self, other: M4) -> M4 {
-        M4(std::array::from_fn(|k| mask(self.0[k] == other.0[k])))
+    fn columns(rows: [&[f32; 4]; 8]) -> [[f32; 8]; 4] {
+        std::array::from_fn(|k| rows.map(|row| row[k]))
     }
 
     #[inline(always)]
-    pub(super) fn less_than(self, other: M4) -> M4 {
-        M4(std::array::from_fn(|k| mask((self.0[k] as i32) < other.0[k] as i32)))
+    fn add_f(a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        lanes(a, b, |a, b| a + b)
     }
 
     #[inline(always)]
-    pub(super) fn and(self, other: M4) -> M4 {
-        M4(std::array::from_fn(|k| self.0[k] & other.0[k]))
+    fn sub_f(a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        lanes(a, b, |a, b| a - b)
     }
 
     #[inline(always)]
-    pub(super) fn either(self, other: M4) -> M4 {
-        M4(std::array::from_fn(|k| self.0[k] | other.0[k]))
+    fn mul_f(a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        lanes(a, b, |a, b| a * b)
     }
 
     #[inline(always)]
-    pub(super) fn plus(self, other: M4) -> M4 {
-        M4(std::array::from_fn(|k| self.0[k].wrapping_add(other.0[k])))
+    fn div_f(a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        lanes(a, b, |a, b| a / b)
     }
 
     #[inline(always)]
-    pub(super) fn minus(self, other: M4) -> M4 {
-        M4(std::array::from_fn(|k| self.0[k].wrapping_sub(other.0[k])))
+    fn less_than_f(a: [f32; 8], b: [f32; 8]) -> [u32; 8] {
+        lanes(a, b, |a, b| mask(a < b))
     }
 
     #[inline(always)]
-    pub(super) fn times(self, other: M4) -> M4 {
-        M4(std::array::from_fn(|k| self.0[k].wrapping_mul(other.0[k])))
+    fn select_f(mask: [u32; 8], a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        std::array::from_fn(|k| if mask[k] == 0 { b[k] } else { a[k] })
     }
 
     #[inline(always)]
-    pub(super) fn to_f32(self) -> F4 {
-        F4(std::array::from_fn(|k| self.0[k] as i32 as f32))
+    fn truncated(a: [f32; 8]) -> [u32; 8] {
+        a.map(|a| a as i32 as u32)
     }
 
     #[inline(always)]
-    pub(super) fn bits(self) -> u32 {
-        (0..4).map(|k| (self.0[k] >> 31) << k).sum()
+    fn splat_m(x: u32) -> [u32; 8] {
+        [x; 8]
+    }
+
+    #[inline(always)]
+    fn load_m(lanes: &[u32; 8]) -> [u32; 8] {
+        *lanes
+    }
+
+    #[inline(always)]
+    fn store_m(a: [u32; 8], lanes: &mut [u32; 8]) {
+        *lanes = a;
+    }
+
+    #[inline(always)]
+    fn equals(a: [u32; 8], b: [u32; 8]) -> [u32; 8] {
+        lanes(a, b, |a, b| mask(a == b))
+    }
+
+    #[inline(always)]
+    fn less_than_m(a: [u32; 8], b: [u32; 8]) -> [u32; 8] {
+        lanes(a, b, |a, b| mask((a as i32) < b as i32))
+    }
+
+    #[inline(always)]
+    fn and(a: [u32; 8], b: [u32; 8]) -> [u32; 8] {
+        lanes(a, b, |a, b| a & b)
+    }
+
+    #[inline(always)]
+    fn either(a: [u32; 8], b: [u32; 8]) -> [u32; 8] {
+        lanes(a, b, |a, b| a | b)
+    }
+
+    #[inline(always)]
+    fn plus(a: [u32; 8], b: [u32; 8]) -> [u32; 8] {
+        lanes(a, b, u32::wrapping_add)
+    }
+
+    #[inline(always)]
+    fn minus(a: [u32; 8], b: [u32; 8]) -> [u32; 8] {
+        lanes(a, b, u32::wrapping_sub)
+    }
+
+    #[inline(always)]
+    fn times(a: [u32; 8], b: [u32; 8]) -> [u32; 8] {
+        lanes(a, b, u32::wrapping_mul)
+    }
+
+    #[inline(always)]
+    fn to_f32(a: [u32; 8]) -> [f32; 8] {
+        a.map(|a| a as i32 as f32)
+    }
+
+    #[inline(always)]
+    fn bits(a: [u32; 8]) -> u32 {
+        (0..8).fold(0, |bits, k| bits | (a[k] >> 31) << k)
     }
 }

@@ -13,7 +13,7 @@ use super::fill::{self, AROUND};
 use super::holes::{Hole, Waiting};
 use super::store::{EMPTY, Layout, Store, TICK_SECS, Tick, centres, distance2};
 use crate::rates::Rates;
-use crate::wide::{self, F8, M8, Planes};
+use crate::wide::{self, F8, M8, Planes, Unit};
 use crate::{Size, Time};
 
 /// What became of the pixels.
@@ -104,13 +104,13 @@ struct OffCentre<'a, F> {
 
 impl<F: Fn(u32) -> bool> wide::Task for OffCentre<'_, F> {
     #[inline(always)]
-    fn run(self) {
+    fn run<U: Unit>(self) {
         let OffCentre { store, rests, waiting } = self;
         let Layout { size, plane, .. } = store.layout;
         for y in 0..size.height {
             for x in (0..size.width).step_by(8) {
                 let first = store.layout.of_pixel(x as i32, y as i32);
-                let (mut known, mut central) = (M8::splat(0), M8::splat(0));
+                let (mut known, mut central) = (M8::<U>::splat(0), M8::splat(0));
                 for sub in 0..store.layout.subs() {
                     let i = first + sub * plane;
                     let is_sample = M8::load(&store.object, i).equals(M8::splat(EMPTY)).not();
@@ -179,34 +179,34 @@ struct Blocks<'a> {
 }
 
 /// Eight pixels in a row of one tile.
-struct Eight {
+struct Eight<U: Unit> {
     /// The first cell of the first one.
     first: usize,
-    centre: [F8; 2],
+    centre: [F8<U>; 2],
     /// The tile's learned rate of change, and its contrast.
-    v: F8,
-    s: F8,
+    v: F8<U>,
+    s: F8<U>,
 }
 
 /// What eight pixels show.
-struct Seen {
-    rgb: [F8; 3],
+struct Seen<U: Unit> {
+    rgb: [F8<U>; 3],
     /// The object; [`EMPTY`] where there is none.
-    object: M8,
+    object: M8<U>,
     /// The expected error of the reference.
-    error: F8,
+    error: F8<U>,
     /// When the pixel's newest sample was traced.
-    tick: M8,
+    tick: M8<U>,
 }
 
 impl wide::Task for Blocks<'_> {
     #[inline(always)]
-    fn run(mut self) {
+    fn run<U: Unit>(mut self) {
         let size = self.model.store.layout.size;
         let columns = self.model.rates.grid.columns;
         for y in 0..size.height {
             for x in (0..size.width).step_by(8) {
-                self.block(x, y, (y / 8 * columns + x / 8) as usize);
+                self.block::<U>(x, y, (y / 8 * columns + x / 8) as usize);
             }
         }
     }
@@ -214,10 +214,10 @@ impl wide::Task for Blocks<'_> {
 
 impl Blocks<'_> {
     #[inline(always)]
-    fn block(&mut self, x: u32, y: u32, tile: usize) {
+    fn block<U: Unit>(&mut self, x: u32, y: u32, tile: usize) {
         let Model { store, rates, contrast, .. } = self.model;
         let size = store.layout.size;
-        let eight = Eight {
+        let eight = Eight::<U> {
             first: store.layout.of_pixel(x as i32, y as i32),
             centre: centres(x, y),
             v: F8::splat(rates.of_tile(tile)),
@@ -236,10 +236,12 @@ impl Blocks<'_> {
         };
         if !exact.either(seen.object.equals(empty)).all() {
             let mean = self.model.mean(&eight, self.cells, seen.object, holes);
-            seen.rgb = [0, 1, 2].map(|k| seen.rgb[k].or(exact, mean[k]));
+            seen.rgb = F8::all_or(seen.rgb, exact, mean);
         }
         let start = size.index(x, y) as usize;
-        let (rgb, ticks, are_holes) = (seen.rgb.map(F8::lanes), seen.tick.lanes(), holes.bits());
+        let [r, g, b] = seen.rgb;
+        let rgb = [r.lanes(), g.lanes(), b.lanes()];
+        let (ticks, are_holes) = (seen.tick.lanes(), holes.bits());
         let pixels = start..start + lanes;
         let picture = &mut self.picture[pixels.clone()];
         let known = &mut self.gather.known[pixels.clone()];
@@ -258,10 +260,10 @@ impl Blocks<'_> {
 
     /// How well holes can be guessed, and whose sample they show.
     #[inline(always)]
-    fn note_holes(&mut self, eight: &Eight, holes: M8, x: u32, y: u32) {
+    fn note_holes<U: Unit>(&mut self, eight: &Eight<U>, holes: M8<U>, x: u32, y: u32) {
         let Model { store, .. } = self.model;
         let size = store.layout.size;
-        let (mut nearest, mut known) = (M8::splat(AROUND.len() as u32), M8::splat(0));
+        let (mut nearest, mut known) = (M8::<U>::splat(AROUND.len() as u32), M8::splat(0));
         for (k, &offset) in self.cells.pixels.iter().enumerate().rev() {
             let first = eight.first.wrapping_add_signed(offset);
             let is_known = self.model.are_known(first, self.cells);
@@ -291,14 +293,14 @@ impl Blocks<'_> {
 
 impl Model<'_> {
     #[inline(always)]
-    fn errors(&self, px: [F8; 2], tick: M8, eight: &Eight) -> F8 {
+    fn errors<U: Unit>(&self, px: [F8<U>; 2], tick: M8<U>, eight: &Eight<U>) -> F8<U> {
         let age_secs = M8::splat(self.now.0).minus(tick).to_f32() * F8::splat(TICK_SECS);
         eight.v * age_secs + eight.s * distance2(px, &eight.centre)
     }
 
     /// The pixels' own samples with the least expected error.
     #[inline(always)]
-    fn own(&self, eight: &Eight, cells: &Cells) -> Seen {
+    fn own<U: Unit>(&self, eight: &Eight<U>, cells: &Cells) -> Seen<U> {
         let mut seen = Seen {
             rgb: [F8::splat(0.0); 3],
             object: M8::splat(EMPTY),
@@ -317,14 +319,14 @@ impl Model<'_> {
             let better = error.less_than(seen.error).and(is_sample);
             seen.error = error.or(better, seen.error);
             seen.object = object.or(better, seen.object);
-            seen.rgb = [0, 1, 2].map(|k| rgb[k].or(better, seen.rgb[k]));
+            seen.rgb = F8::all_or(rgb, better, seen.rgb);
         }
         seen
     }
 
     /// The objects of the samples nearest to the centres of holes; [`EMPTY`] where there is none around.
     #[inline(always)]
-    fn nearest(&self, eight: &Eight, cells: &Cells) -> M8 {
+    fn nearest<U: Unit>(&self, eight: &Eight<U>, cells: &Cells) -> M8<U> {
         let mut least = F8::splat(f32::INFINITY);
         let mut nearest = M8::splat(EMPTY);
         for &(offset, _) in &cells.around {
@@ -341,7 +343,13 @@ impl Model<'_> {
 
     /// Over the objects' samples: those in the pixel's cells and one further around, for holes in the 3×3 pixels around.
     #[inline(always)]
-    fn mean(&self, eight: &Eight, cells: &Cells, object: M8, holes: M8) -> [F8; 3] {
+    fn mean<U: Unit>(
+        &self,
+        eight: &Eight<U>,
+        cells: &Cells,
+        object: M8<U>,
+        holes: M8<U>,
+    ) -> [F8<U>; 3] {
         let floor = F8::splat(least_error(eight.s.lanes()[0]));
         let zero = F8::splat(0.0);
         let (mut red, mut green, mut blue, mut weights) = (zero, zero, zero, zero);
@@ -362,7 +370,7 @@ impl Model<'_> {
 
     /// Whether the pixels have samples of their own.
     #[inline(always)]
-    fn are_known(&self, first: usize, cells: &Cells) -> M8 {
+    fn are_known<U: Unit>(&self, first: usize, cells: &Cells) -> M8<U> {
         let mut known = M8::splat(0);
         for &offset in &cells.own {
             let [object, _] = self.marks.load(first.wrapping_add_signed(offset));

@@ -102,9 +102,14 @@ impl Relight {
     }
 
     fn shade(&self, store: &mut Store, display: &Display) {
+        let mut before = (EMPTY, false);
         for i in 0..store.layout.len() {
             let object = store.object[i];
-            if object == EMPTY || !self.has_changed(object) {
+            // Neighbours are mostly of the same object.
+            if object != before.0 {
+                before = (object, self.has_changed(object));
+            }
+            if !before.1 {
                 continue;
             }
             if let Some(rgb) = store.shade(i).relit(&store.surface(i), &self.shown) {

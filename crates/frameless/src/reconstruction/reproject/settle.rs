@@ -18,14 +18,19 @@ use super::relight::Relight;
 use super::residual::squared;
 use super::store::{EMPTY, Layout, SCREEN, Store};
 use crate::tile::TileGrid;
-use crate::wide::{self, M8};
+use crate::wide::{self, M8, Unit};
 use crate::{Display, Pose, Refinement, Refresh, Size, Surface};
 
 /// Per pixel what its samples add up to; nothing where it is not at rest.
 #[derive(Default)]
 pub(super) struct Settled {
     count: Vec<u16>,
-    mean: Vec<Mean>,
+    /// Linear RGB.
+    sum: Vec<[f32; 3]>,
+    /// (n − 1) σ².
+    spread: Vec<f32>,
+    /// μ, display-referred.
+    encoded: Vec<[f32; 3]>,
     grid: Option<TileGrid>,
     /// Per tile: the variance of a pixel's samples.
     noise: Vec<f32>,
@@ -34,17 +39,6 @@ pub(super) struct Settled {
     /// Object numbers that have moved since the last refresh.
     moved: Vec<bool>,
     sky_moved: bool,
-}
-
-/// What the samples of a pixel add up to.
-#[derive(Clone, Copy, Default)]
-struct Mean {
-    /// Linear RGB.
-    sum: [f32; 3],
-    /// (n − 1) σ².
-    spread: f32,
-    /// μ, display-referred.
-    encoded: [f32; 3],
 }
 
 /// Samples that add up in a pixel where the renderer has no noise: more cannot be told apart in 8 bits.
@@ -66,7 +60,9 @@ impl Settled {
     pub(super) fn fit(&mut self, size: Size) {
         let grid = TileGrid::new(size, TILE);
         self.count = vec![0; size.pixels()];
-        self.mean = vec![Mean::default(); size.pixels()];
+        self.sum = vec![[0.0; 3]; size.pixels()];
+        self.spread = vec![0.0; size.pixels()];
+        self.encoded = vec![[0.0; 3]; size.pixels()];
         self.noise = vec![0.0; grid.len()];
         self.grid = Some(grid);
     }
@@ -85,7 +81,8 @@ impl Settled {
     #[inline(always)]
     pub(super) fn prefetch(&self, pixel: u32) {
         wide::prefetch(&self.count, pixel as usize);
-        wide::prefetch(&self.mean, pixel as usize);
+        wide::prefetch(&self.sum, pixel as usize);
+        wide::prefetch(&self.encoded, pixel as usize);
     }
 
     /// Variance of the samples of a pixel in the tile, Σ over the channels, as far as it is known.
@@ -95,20 +92,21 @@ impl Settled {
 
     fn begin(&mut self, pixel: usize, rgb: [f32; 3], display: &Display) {
         self.count[pixel] = 1;
-        self.mean[pixel] = Mean { sum: rgb, spread: 0.0, encoded: display.encode(rgb) };
+        (self.sum[pixel], self.spread[pixel]) = (rgb, 0.0);
+        self.encoded[pixel] = display.encode(rgb);
     }
 
     /// Linear mean of the pixel's samples.
     fn mean(&self, pixel: usize) -> [f32; 3] {
         let per_count = 1.0 / f32::from(self.count[pixel]);
-        self.mean[pixel].sum.map(|c| c * per_count)
+        self.sum[pixel].map(|c| c * per_count)
     }
 
     /// Means for another display.
     pub(super) fn encode_again(&mut self, display: &Display) {
         for pixel in 0..self.count.len() {
             if self.count[pixel] > 0 {
-                self.mean[pixel].encoded = display.encode(self.mean(pixel));
+                self.encoded[pixel] = display.encode(self.mean(pixel));
             }
         }
     }
@@ -127,19 +125,18 @@ impl Settled {
             return Refinement { deviation: 0.0, suspect: false };
         }
         let n = f32::from(self.count[pixel]);
-        let Mean { spread, encoded, .. } = self.mean[pixel];
-        let deviation = squared(display.encode(rgb), encoded) * n / (n + 1.0);
-        let suspect = deviation > SUSPECT * (spread + FIRST_SPREAD) / n;
-        self.mean[pixel].spread += deviation;
+        let deviation = squared(display.encode(rgb), self.encoded[pixel]) * n / (n + 1.0);
+        let suspect = deviation > SUSPECT * (self.spread[pixel] + FIRST_SPREAD) / n;
+        self.spread[pixel] += deviation;
         if let Some(tile) = tile {
             self.noise[tile] += NOISE_MEMORY * (deviation - self.noise[tile]);
         }
         if self.count[pixel] == MOST_SAMPLES {
             self.keep_only(pixel, MOST_SAMPLES / 2);
         }
-        (0..3).for_each(|k| self.mean[pixel].sum[k] += rgb[k]);
+        (0..3).for_each(|k| self.sum[pixel][k] += rgb[k]);
         self.count[pixel] += 1;
-        self.mean[pixel].encoded = display.encode(self.mean(pixel));
+        self.encoded[pixel] = display.encode(self.mean(pixel));
         Refinement { deviation, suspect }
     }
 
@@ -157,7 +154,7 @@ impl Settled {
         }
         let pixel = pixel as usize;
         let n = self.count[pixel];
-        let variance = self.mean[pixel].spread / (f32::from(n) - 1.0).max(1.0);
+        let variance = self.spread[pixel] / (f32::from(n) - 1.0).max(1.0);
         let as_good = if is_noisy { (variance / change) as u16 } else { 0 };
         if as_good <= 1 {
             self.begin(pixel, rgb, display);
@@ -168,9 +165,8 @@ impl Settled {
 
     fn keep_only(&mut self, pixel: usize, count: u16) {
         let part = f32::from(count) / f32::from(self.count[pixel]);
-        let mean = &mut self.mean[pixel];
-        mean.sum = mean.sum.map(|c| c * part);
-        mean.spread *= part;
+        self.sum[pixel] = self.sum[pixel].map(|c| c * part);
+        self.spread[pixel] *= part;
         self.count[pixel] = count;
     }
 
@@ -222,6 +218,9 @@ impl Settled {
         refresh: &Refresh<'_>,
         picture: &mut [[f32; 3]],
     ) {
+        if !self.any_rests() && !self.count.iter().any(|&n| n > 0) {
+            return;
+        }
         self.find_moving(store);
         wide::run(Show { settled: self, store, relight, refresh, picture });
     }
@@ -252,7 +251,7 @@ struct Marks<'a> {
 
 impl wide::Task for &mut Marks<'_> {
     #[inline(always)]
-    fn run(self) {
+    fn run<U: Unit>(self) {
         let (eights, _) = self.store.object.as_chunks::<8>();
         for sub in eights.chunks_exact(self.store.layout.plane / 8) {
             for (objects, marks) in sub.iter().zip(self.moving.as_chunks_mut::<8>().0) {
@@ -280,11 +279,11 @@ struct Show<'a> {
 
 impl wide::Task for Show<'_> {
     #[inline(always)]
-    fn run(mut self) {
+    fn run<U: Unit>(mut self) {
         let Size { width, height } = self.store.layout.size;
         for y in 0..height {
             for x in (0..width).step_by(8) {
-                self.eight(x, y, 8.min((width - x) as usize));
+                self.eight::<U>(x, y, 8.min((width - x) as usize));
             }
         }
     }
@@ -292,14 +291,11 @@ impl wide::Task for Show<'_> {
 
 impl Show<'_> {
     #[inline(always)]
-    fn eight(&mut self, x: u32, y: u32, lanes: usize) {
+    fn eight<U: Unit>(&mut self, x: u32, y: u32, lanes: usize) {
         let start = self.store.layout.size.index(x, y) as usize;
-        let rest = self.at_rest(x, y) & ((1 << lanes) - 1);
-        let counts = &self.settled.count[start..start + lanes];
-        let has = |is: fn(u16) -> bool| {
-            counts.iter().enumerate().fold(0u32, |bits, (lane, &n)| bits | u32::from(is(n)) << lane)
-        };
-        let (some, many) = (has(|n| n > 0), has(|n| n > 1));
+        let all = (1 << lanes) - 1;
+        let rest = self.at_rest::<U>(x, y) & all;
+        let (some, many) = self.counted::<U>(start, lanes);
         let mut begin = rest & !some;
         if self.relight.has_changed_any() {
             begin |= rest & some & self.relit(x, y, lanes);
@@ -307,12 +303,28 @@ impl Show<'_> {
         each(begin, |lane| self.begin(x + lane as u32, y));
         each(some & !rest, |lane| self.end(x + lane as u32, y));
         let shown = many & rest & !begin;
-        each(shown, |lane| self.picture[start + lane] = self.settled.mean[start + lane].encoded);
+        if shown == all {
+            let means = &self.settled.encoded[start..start + lanes];
+            self.picture[start..start + lanes].copy_from_slice(means);
+        } else {
+            each(shown, |lane| self.picture[start + lane] = self.settled.encoded[start + lane]);
+        }
+    }
+
+    /// A bit for each of eight pixels: whether it has samples, and whether it has more than one.
+    #[inline(always)]
+    fn counted<U: Unit>(&self, start: usize, lanes: usize) -> (u32, u32) {
+        let mut counts = [0; 8];
+        for (count, &n) in counts.iter_mut().zip(&self.settled.count[start..start + lanes]) {
+            *count = u32::from(n);
+        }
+        let more_than = |n| M8::<U>::splat(n).less_than(M8::new(counts)).bits();
+        (more_than(0), more_than(1))
     }
 
     /// A bit for each of eight pixels: whether it has a sample at its centre, and nothing moves in it and the eight around it.
     #[inline(always)]
-    fn at_rest(&self, x: u32, y: u32) -> u32 {
+    fn at_rest<U: Unit>(&self, x: u32, y: u32) -> u32 {
         let Layout { plane, stride, .. } = self.store.layout;
         let first = self.store.layout.of_pixel(x as i32, y as i32);
         let around = [first - stride, first, first + stride].map(|i| {
@@ -328,8 +340,8 @@ impl Show<'_> {
             return 0;
         }
         let subs = (0..self.store.layout.subs()).map(|sub| first + sub * plane);
-        let central =
-            subs.fold(M8::splat(0), |any, cell| any.either(self.store.are_central(cell, x, y)));
+        let central = subs
+            .fold(M8::<U>::splat(0), |any, cell| any.either(self.store.are_central(cell, x, y)));
         still & central.bits()
     }
 

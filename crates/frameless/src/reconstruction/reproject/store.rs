@@ -8,7 +8,7 @@
 //! stays where it is. There are as many slots as cells, and every cell has one, also while it is empty.
 
 use super::packed::{PackedAlbedo, PackedNormal};
-use crate::wide::{self, F8, M8};
+use crate::wide::{self, F8, M8, Unit};
 use crate::{Display, Kept, Size, Surface, Time};
 
 /// The object number of samples of which the renderer could not say what they hit: they stay where they are in the picture.
@@ -306,7 +306,7 @@ impl Store {
 
     /// Of the cell `first` of pixel (x, y) and the seven to its right: whether there are samples at the pixels' centres.
     #[inline(always)]
-    pub(super) fn are_central(&self, first: usize, x: u32, y: u32) -> M8 {
+    pub(super) fn are_central<U: Unit>(&self, first: usize, x: u32, y: u32) -> M8<U> {
         let is_sample = M8::load(&self.object, first).equals(M8::splat(EMPTY)).not();
         let px = [F8::load(&self.px[0], first), F8::load(&self.px[1], first)];
         let near = F8::splat(CENTRAL_PX * CENTRAL_PX);
@@ -337,13 +337,13 @@ impl Store {
 
 /// Of the eight pixels from (x, y) on.
 #[inline(always)]
-pub(super) fn centres(x: u32, y: u32) -> [F8; 2] {
+pub(super) fn centres<U: Unit>(x: u32, y: u32) -> [F8<U>; 2] {
     let columns = M8::new([0, 1, 2, 3, 4, 5, 6, 7]).plus(M8::splat(x));
     [columns.to_f32() + F8::splat(0.5), F8::splat(y as f32 + 0.5)]
 }
 
 #[inline(always)]
-pub(super) fn distance2(px: [F8; 2], centre: &[F8; 2]) -> F8 {
+pub(super) fn distance2<U: Unit>(px: [F8<U>; 2], centre: &[F8<U>; 2]) -> F8<U> {
     let (dx, dy) = (px[0] - centre[0], px[1] - centre[1]);
     dx * dx + dy * dy
 }

@@ -6,7 +6,7 @@
 //! last what is seen through the cracks between a nearer object's samples is taken away.
 
 use super::store::{Anchor, EMPTY, Layout, SCREEN, Store};
-use crate::wide::{self, F8, M8};
+use crate::wide::{self, F8, M8, Unit};
 use crate::{Pose, Surface};
 
 /// Depths within this ratio belong to the same surface.
@@ -165,7 +165,7 @@ struct Carry<'a, F> {
 
 impl<F: Fn(u32) -> bool> wide::Task for Carry<'_, F> {
     #[inline(always)]
-    fn run(mut self) {
+    fn run<U: Unit>(mut self) {
         let rows = self.store.layout.size.height as usize;
         for row in 0..rows + ROWS_AHEAD {
             // Whose turn it is to be lifted next is put down first.
@@ -173,35 +173,35 @@ impl<F: Fn(u32) -> bool> wide::Task for Carry<'_, F> {
                 self.put_down_row(row % ROWS_AHEAD, row.min(rows) as i32);
             }
             if row < rows {
-                self.lift_row(row as i32);
+                self.lift_row::<U>(row as i32);
             }
         }
     }
 }
 
 /// Where eight samples are.
-struct There {
-    px: [F8; 2],
-    depth: F8,
+struct There<U: Unit> {
+    px: [F8<U>; 2],
+    depth: F8<U>,
 }
 
 impl<F: Fn(u32) -> bool> Carry<'_, F> {
     #[inline(always)]
-    fn lift_row(&mut self, y: i32) {
+    fn lift_row<U: Unit>(&mut self, y: i32) {
         let turn = y as usize % ROWS_AHEAD;
         self.warp.lifted[turn].len = 0;
         let Layout { size, plane, .. } = self.store.layout;
         for sub in 0..self.store.layout.subs() {
             for x in (0..size.width as i32).step_by(8) {
                 let start = self.store.layout.of_pixel(x, y) + sub * plane;
-                self.lift_eight(start, turn);
+                self.lift_eight::<U>(start, turn);
             }
         }
     }
 
     #[inline(always)]
-    fn lift_eight(&mut self, start: usize, turn: usize) {
-        let objects = M8::load(&self.store.object, start);
+    fn lift_eight<U: Unit>(&mut self, start: usize, turn: usize) {
+        let objects = M8::<U>::load(&self.store.object, start);
         let mut waiting = objects.equals(M8::splat(EMPTY)).not();
         let mut moving = M8::splat(0);
         let gone = F8::splat(GONE_PX);
@@ -213,7 +213,7 @@ impl<F: Fn(u32) -> bool> Carry<'_, F> {
             if !(self.rests)(object) {
                 moving = moving.either(same);
                 let now = carry_eight(self.store, self.pose, object, start);
-                there.px = [0, 1].map(|k| now.px[k].or(same, there.px[k]));
+                there.px = F8::all_or(now.px, same, there.px);
                 there.depth = now.depth.or(same, there.depth);
             }
         }
@@ -249,13 +249,19 @@ impl<F: Fn(u32) -> bool> Carry<'_, F> {
 
 /// Takes the samples that are `moving` out of their cells.
 #[inline(always)]
-fn lift(store: &mut Store, start: usize, moving: M8, there: &There, eight: &mut Eight) {
+fn lift<U: Unit>(
+    store: &mut Store,
+    start: usize,
+    moving: M8<U>,
+    there: &There<U>,
+    eight: &mut Eight,
+) {
     let (object, slot) = (M8::load(&store.object, start), M8::load(&store.slot, start));
     M8::splat(EMPTY).or(moving, object).store(&mut store.object, start);
     M8::splat(NO_SLOT).or(moving, slot).store(&mut store.slot, start);
     eight.lanes = moving.bits();
     eight.cell = cells_at(&store.layout, there.px).lanes();
-    eight.px = there.px.map(F8::lanes);
+    eight.px = [there.px[0].lanes(), there.px[1].lanes()];
     eight.depth = there.depth.lanes();
     for (rgb, plane) in eight.rgb.iter_mut().zip(&store.rgb) {
         rgb.copy_from_slice(&plane[start..start + 8]);
@@ -268,7 +274,7 @@ fn lift(store: &mut Store, start: usize, moving: M8, there: &There, eight: &mut 
 
 /// The eight samples from `start` on, as if all were of the same object.
 #[inline(always)]
-fn carry_eight(store: &Store, pose: &Pose, object: u32, start: usize) -> There {
+fn carry_eight<U: Unit>(store: &Store, pose: &Pose, object: u32, start: usize) -> There<U> {
     let gone = F8::splat(GONE_PX);
     if matches!(pose.deformed.get(object as usize), Some(Some(_))) {
         return carry_deformed(store, pose, object, start);
@@ -281,20 +287,20 @@ fn carry_eight(store: &Store, pose: &Pose, object: u32, start: usize) -> There {
     let (anchors, _) = store.anchor[start..start + 8].as_chunks::<8>();
     let [x, y, z, _] = F8::columns(anchors[0].each_ref().map(|anchor| &anchor.0));
     let row = |k: usize| {
-        let [a, b, c, d] = projection.0[k].map(F8::splat);
-        a * x + b * y + (c * z + d)
+        let [a, b, c, d] = projection.0[k];
+        F8::splat(a) * x + F8::splat(b) * y + (F8::splat(c) * z + F8::splat(d))
     };
     let w = row(3);
     let in_front = F8::splat(0.0).less_than(w);
     let per_w = F8::splat(1.0) / w;
     let infinite = if object == Surface::SKY { f32::INFINITY } else { 0.0 };
     There {
-        px: [0, 1].map(|k| (row(k) * per_w).or(in_front, gone)),
+        px: F8::all_or([row(0) * per_w, row(1) * per_w], in_front, [gone; 2]),
         depth: row(2) + F8::splat(infinite),
     }
 }
 
-fn carry_deformed(store: &Store, pose: &Pose, object: u32, start: usize) -> There {
+fn carry_deformed<U: Unit>(store: &Store, pose: &Pose, object: u32, start: usize) -> There<U> {
     let (mut px, mut depth) = ([[GONE_PX; 8]; 2], [GONE_PX; 8]);
     for lane in 0..8 {
         if store.object[start + lane] == object
@@ -309,19 +315,19 @@ fn carry_deformed(store: &Store, pose: &Pose, object: u32, start: usize) -> Ther
 
 /// [`Layout::of_px`], eight at a time; [`NOWHERE`] outside.
 #[inline(always)]
-fn cells_at(layout: &Layout, px: [F8; 2]) -> M8 {
+fn cells_at<U: Unit>(layout: &Layout, px: [F8<U>; 2]) -> M8<U> {
     let zero = F8::splat(0.0);
-    let [below, above] = px.map(|p| p.less_than(zero));
+    let (left, above) = (px[0].less_than(zero), px[1].less_than(zero));
     let size = layout.size;
     let inside = px[0].less_than(F8::splat(size.width as f32));
     let inside = inside.and(px[1].less_than(F8::splat(size.height as f32)));
-    let inside = inside.and(below.not()).and(above.not());
-    let [column, row] = px.map(F8::truncated);
+    let inside = inside.and(left.not()).and(above.not());
+    let (column, row) = (px[0].truncated(), px[1].truncated());
     let first = row.times(M8::splat(layout.stride as u32)).plus(column);
     let mut cell = first.plus(M8::splat(layout.of_pixel(0, 0) as u32));
     if layout.per_side > 1 {
         let (n, last) = (layout.per_side, M8::splat(layout.per_side - 1));
-        let sub = |p: F8, whole: M8| {
+        let sub = |p: F8<U>, whole: M8<U>| {
             let sub = ((p - whole.to_f32()) * F8::splat(n as f32)).truncated();
             sub.or(sub.less_than(last), last)
         };
@@ -399,7 +405,7 @@ struct Cracks<'a> {
 
 impl wide::Task for Cracks<'_> {
     #[inline(always)]
-    fn run(self) {
+    fn run<U: Unit>(self) {
         let Cracks { store, covered } = self;
         let layout = &store.layout;
         let (n, size) = (layout.per_side as i32, layout.size);
@@ -408,7 +414,7 @@ impl wide::Task for Cracks<'_> {
             for y in 1..size.height as i32 - 1 {
                 for x in (1..size.width as i32 - 1).step_by(8) {
                     let first = layout.of_pixel(x, y) + sub as usize * layout.plane;
-                    let inside = M8::first_lanes((size.width as i32 - 1 - x) as usize);
+                    let inside = M8::<U>::first_lanes((size.width as i32 - 1 - x) as usize);
                     let mask = are_covered(store, first, &around).and(inside);
                     mask.for_each(|lane| covered.push((first + lane) as u32));
                 }
@@ -445,7 +451,7 @@ impl Around {
 
 /// Whether at least six of the eight samples around are of nearer, other objects, and at most one is not.
 #[inline(always)]
-fn are_covered(store: &Store, first: usize, around: &Around) -> M8 {
+fn are_covered<U: Unit>(store: &Store, first: usize, around: &Around) -> M8<U> {
     let objects = M8::load(&store.object, first);
     let empty = M8::splat(EMPTY);
     let left = M8::load(&store.object, first - 1).equals(objects);
