@@ -199,15 +199,8 @@ mod tests {
     use super::*;
     use crate::Size;
 
-    fn observation(pixel: u32, now: u64, previous: u64, change: f32) -> Observation {
-        Observation {
-            pixel,
-            now: Time(now),
-            previous: Time(previous),
-            known: true,
-            change,
-            refinement: None,
-        }
+    fn observation(pixel: u32, now: Time, previous: Time, change: f32) -> Observation {
+        Observation { pixel, now, previous, known: true, change, refinement: None }
     }
 
     #[test]
@@ -230,14 +223,7 @@ mod tests {
             let (pixel, now) = (rng.below(size.pixels() as u32), Time(i * 1111));
             let (previous, _) = canvas.replace(pixel, now, [0.0; 3]);
             let change = if rng.below(3) == 0 { 3.0 * rng.unit_f32() } else { 0.0 };
-            sums.update(&Observation {
-                pixel,
-                now,
-                previous,
-                known: true,
-                change,
-                refinement: None,
-            });
+            sums.update(&observation(pixel, now, previous, change));
             d[pixel as usize] = fixed(change);
         }
         assert_eq!(sums, Sums::from_scratch(&canvas, 16, &d));
@@ -252,14 +238,7 @@ mod tests {
         sampler.choose(Time(1), &canvas, 500, &mut requests);
         let observe = |request: &Request| {
             let (previous, _) = canvas.replace(request.pixel, Time(50), [0.5; 3]);
-            Observation {
-                pixel: request.pixel,
-                now: Time(50),
-                previous,
-                known: true,
-                change: 0.75,
-                refinement: None,
-            }
+            observation(request.pixel, Time(50), previous, 0.75)
         };
         let observations: Vec<Observation> = requests.iter().map(observe).collect();
         sampler.observe(&canvas, &observations);
@@ -280,14 +259,7 @@ mod tests {
             let pixel = rng.below(size.pixels() as u32);
             let (now, change) = (Time(1000 + i), rng.unit_f32());
             let (previous, _) = canvas.replace(pixel, now, [0.0; 3]);
-            sums.update(&Observation {
-                pixel,
-                now,
-                previous,
-                known: true,
-                change,
-                refinement: None,
-            });
+            sums.update(&observation(pixel, now, previous, change));
             d[pixel as usize] = f64::from(change);
         }
         // The formulas of the paper, pixel by pixel.
