@@ -12,7 +12,7 @@ use super::AdaptiveStage;
 use super::order::{self, Order};
 use super::shares::Shares;
 use crate::rates::Rates;
-use crate::{Canvas, Rng, Time};
+use crate::{Canvas, Rng, Time, wide};
 
 /// ε: the part of the samples that is spread evenly over the picture, so that every pixel has a floor frequency.
 const EVENLY: f32 = 0.2;
@@ -103,6 +103,8 @@ impl Credit {
         self.first.clear();
         for &tile in &self.tiles {
             let pixel = self.order.next(&rates.grid, tile as usize);
+            wide::prefetch(canvas.known(), pixel as usize);
+            wide::prefetch(canvas.time(), pixel as usize);
             self.first.push((pixel, 0));
         }
         for (pixel, age_nanos) in &mut self.first {

@@ -36,14 +36,6 @@ impl Bits {
         let (eight, bit) = (&mut self.0[pixel as usize / 8], pixel % 8);
         *eight = *eight & !(1 << bit) | u8::from(value) << bit;
     }
-
-    /// Begin to fetch those of a pixel and its neighbours.
-    #[inline]
-    fn prefetch_around(&self, pixel: u32, size: Size) {
-        for pixel in [pixel.saturating_sub(size.width), pixel, pixel + size.width] {
-            wide::prefetch(&self.0, pixel as usize / 8);
-        }
-    }
 }
 
 /// Whether what was known there is wrong now.
@@ -96,7 +88,11 @@ impl Front {
         changed.clear();
         changed.extend(observations.iter().filter(|observed| is_part(observed)));
         for observed in &changed {
-            self.queued.prefetch_around(observed.pixel, canvas.size());
+            let (pixel, width) = (observed.pixel as usize, canvas.size().width as usize);
+            for pixel in [pixel.saturating_sub(width), pixel, pixel + width] {
+                wide::prefetch(&self.queued.0, pixel / 8);
+                wide::prefetch(canvas.time(), pixel);
+            }
         }
         // Looking lies apart from queueing, without a branch that depends on what is seen, so that many pixels are fetched at once.
         let mut stale = std::mem::take(&mut self.stale);

@@ -34,6 +34,14 @@ impl Order {
         wide::prefetch(&self.place, tile);
     }
 
+    /// The next pixel of a tile, but one near it where the border cuts the tile.
+    #[inline]
+    pub(crate) fn peek(&self, grid: &TileGrid, tile: usize) -> u32 {
+        let rect = grid.rect(tile);
+        let (dx, dy) = self.order[usize::from(self.place[tile]) & (self.order.len() - 1)];
+        grid.size.index((rect.x0 + dx).min(rect.x1 - 1), (rect.y0 + dy).min(rect.y1 - 1))
+    }
+
     /// The next pixel of a tile, whatever it is.
     #[inline]
     pub(crate) fn next(&mut self, grid: &TileGrid, tile: usize) -> u32 {

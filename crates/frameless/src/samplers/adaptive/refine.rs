@@ -203,6 +203,11 @@ impl Refine {
         let mut drawn = std::mem::take(&mut self.drawn);
         drawn.clear();
         self.shares.draw(count / sum, evenly * count / sum, &mut drawn);
+        for &tile in &drawn {
+            let pixel = self.order.peek(grid, tile as usize) as usize;
+            wide::prefetch(canvas.samples(), pixel);
+            wide::prefetch(&self.index, pixel);
+        }
         drawn.iter().filter_map(|&tile| self.next(canvas, grid, tile as usize)).for_each(&mut take);
         self.drawn = drawn;
     }
