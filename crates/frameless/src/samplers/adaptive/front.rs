@@ -108,8 +108,9 @@ impl Front {
         while stale != 0 && self.queue.len() < self.capacity {
             let i = stale.trailing_zeros();
             stale &= stale - 1;
-            // Row and column are those of the pixel itself plus 1, so that none is below 0.
-            let pixel = observed.pixel + i / 3 * size.width + i % 3 - size.width - 1;
+            // Bit 0 is one row up and one column to the left: a step back, which wraps.
+            let step = (i / 3 * size.width + i % 3).wrapping_sub(size.width + 1);
+            let pixel = observed.pixel.wrapping_add(step);
             if !self.queued.of(pixel) {
                 self.queued.set(pixel, true);
                 self.queue.push_back((pixel, observed.now));
