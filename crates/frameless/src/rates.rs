@@ -1,7 +1,7 @@
 //! The learned rate of change of every tile.
 
 use crate::tile::TileGrid;
-use crate::{Observation, Size};
+use crate::{Observation, Size, wide};
 
 /// How fast the picture becomes wrong, tile by tile:
 ///
@@ -15,10 +15,19 @@ use crate::{Observation, Size};
 #[derive(Clone, Debug)]
 pub struct Rates {
     pub(crate) grid: TileGrid,
-    change: Vec<f32>,
-    age_secs: Vec<f32>,
-    rate: Vec<f32>,
-    mean_age_secs: Vec<f32>,
+    tiles: Vec<TileRate>,
+}
+
+/// All of a tile in one place: they are looked up together, at random.
+#[derive(Clone, Copy, Debug)]
+struct TileRate {
+    /// D.
+    change: f32,
+    /// A.
+    age_secs: f32,
+    /// v.
+    rate: f32,
+    mean_age_secs: f32,
 }
 
 /// ρ: a tile forgets half of what it knew after eight samples.
@@ -28,42 +37,46 @@ const SHORTEST_AGE_SECS: f32 = 1e-3;
 
 impl Rates {
     pub(crate) fn new(grid: TileGrid) -> Rates {
-        let tiles = grid.len();
-        Rates {
-            grid,
-            change: vec![0.0; tiles],
-            age_secs: vec![SHORTEST_AGE_SECS; tiles],
-            rate: vec![0.0; tiles],
-            mean_age_secs: vec![0.0; tiles],
-        }
+        let unknown =
+            TileRate { change: 0.0, age_secs: SHORTEST_AGE_SECS, rate: 0.0, mean_age_secs: 0.0 };
+        let tiles = vec![unknown; grid.len()];
+        Rates { grid, tiles }
     }
 
-    /// `weight`: below 1 for samples that were not chosen evenly over the tile.
+    /// `weight`: below 1 for samples that were not chosen evenly over the tile. Returns v before and after.
     #[inline]
-    pub(crate) fn observe(&mut self, tile: usize, observed: &Observation, weight: f32) {
+    pub(crate) fn observe(
+        &mut self,
+        tile: usize,
+        observed: &Observation,
+        weight: f32,
+    ) -> (f32, f32) {
         let age_secs = observed.now.secs_since(observed.previous) as f32;
-        let change = &mut self.change[tile];
-        let sum_secs = &mut self.age_secs[tile];
-        *change = MEMORY * *change + weight * observed.change * (1.0 / 3.0);
-        *sum_secs = MEMORY * *sum_secs + weight * age_secs.max(SHORTEST_AGE_SECS);
-        self.rate[tile] = *change / *sum_secs;
-        self.mean_age_secs[tile] += 0.05 * (age_secs - self.mean_age_secs[tile]);
+        let tile = &mut self.tiles[tile];
+        let before = tile.rate;
+        tile.change = MEMORY * tile.change + weight * observed.change * (1.0 / 3.0);
+        tile.age_secs = MEMORY * tile.age_secs + weight * age_secs.max(SHORTEST_AGE_SECS);
+        tile.rate = tile.change / tile.age_secs;
+        tile.mean_age_secs += 0.05 * (age_secs - tile.mean_age_secs);
+        (before, tile.rate)
     }
 
     /// v of a tile: squared error per channel and second.
     #[inline]
     pub(crate) fn of_tile(&self, tile: usize) -> f32 {
-        self.rate[tile]
-    }
-
-    pub(crate) fn all(&self) -> &[f32] {
-        &self.rate
+        self.tiles[tile].rate
     }
 
     /// How old samples of the tile have been, on average, when they were replaced.
     #[inline]
     pub(crate) fn mean_age_secs(&self, tile: usize) -> f32 {
-        self.mean_age_secs[tile]
+        self.tiles[tile].mean_age_secs
+    }
+
+    /// Begin to fetch what is known of a tile.
+    #[inline]
+    pub(crate) fn prefetch(&self, tile: usize) {
+        wide::prefetch(&self.tiles, tile);
     }
 
     /// Of the picture whose tiles these are.
@@ -73,7 +86,7 @@ impl Rates {
 
     /// v where a pixel is: squared error per channel and second.
     pub fn of_pixel(&self, pixel: u32) -> f32 {
-        self.rate[self.grid.tile_of(pixel)]
+        self.of_tile(self.grid.tile_of(pixel))
     }
 }
 

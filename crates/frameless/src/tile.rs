@@ -12,6 +12,7 @@ pub(crate) struct TileGrid {
     pub(crate) rows: u32,
     by_width: Divider,
     by_side: Divider,
+    by_columns: Divider,
 }
 
 /// Divides by a number that is known long before; three times as fast as the processor's own division (Lemire, Kaser and
@@ -58,7 +59,7 @@ impl TileGrid {
         let side = side.max(1);
         let (columns, rows) = (size.width.div_ceil(side), size.height.div_ceil(side));
         let (by_width, by_side) = (Divider::new(size.width), Divider::new(side));
-        TileGrid { size, side, columns, rows, by_width, by_side }
+        TileGrid { size, side, columns, rows, by_width, by_side, by_columns: Divider::new(columns) }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -72,8 +73,10 @@ impl TileGrid {
         (self.by_side.quotient(y) * self.columns + self.by_side.quotient(x)) as usize
     }
 
+    #[inline]
     pub(crate) fn rect(&self, tile: usize) -> TileRect {
-        let (column, row) = (tile as u32 % self.columns, tile as u32 / self.columns);
+        let row = self.by_columns.quotient(tile as u32);
+        let column = tile as u32 - row * self.columns;
         let (x0, y0) = (column * self.side, row * self.side);
         TileRect {
             x0,

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use frameless::{
     Batch, Canvas, Clock, Engine, Function, Observation, ReconstructionKind, Request, Sampler,
-    SamplerKind, Time,
+    SamplerKind, Size, Time, Tracer,
 };
 use frameless_trace::{CpuTracer, Settings, ViewSource, World};
 
@@ -17,8 +17,9 @@ use crate::input;
 /// Rows `sampler.<sampler>.loop_ns`: nanoseconds per sample of the whole loop on the simulated clock with a renderer that
 /// returns a precomputed colour, so that what is left is choosing, keeping and observing.
 ///
-/// Row `sampler.adaptive.ns`: nanoseconds per sample of choosing and observing alone, with what the scene's changes make
-/// of it (holes, fronts, learned rates).
+/// Rows `sampler.choose_observe_ns` and `sampler.choose_observe_ns_4k`: nanoseconds per sample of choosing and observing of
+/// `adaptive` alone, in a scene with what its changes make of it (holes, fronts, learned rates), and in a picture of 3840×2160
+/// of which a tenth changes.
 pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
     let conditions = format!(
         "{}×{}, 938 samples per batch, one thread, {} rounds; a tenth of the picture flickers; \
@@ -31,15 +32,41 @@ pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
         Row::new(format!("sampler.{}.loop_ns", kind.name()), "ns/sample", &rounds, &conditions)
     };
     let mut rows: Vec<Row> = SamplerKind::ALL.into_iter().map(row).collect();
+    rows.push(in_a_scene(args)?);
+    rows.push(in_4k(args));
+    Ok(rows)
+}
+
+fn in_a_scene(args: &BenchArgs) -> Result<Row, Failure> {
     let world = Arc::new(World::new(Arc::new(input::scene(&args.scene)?)));
-    let rounds: Vec<f64> =
-        (0..args.rounds).map(|seed| choosing_nanos(&world, args, u64::from(seed))).collect();
+    let rounds = (0..args.rounds).map(|seed| scene_nanos(&world, args, u64::from(seed)));
     let conditions = format!(
-        "{}, {}×{}, 938 samples per batch, adaptive+reproject, one thread, {} rounds of {} s",
+        "{}, {}×{}, 938 samples per batch, adaptive+reproject refreshed 60 times a second, one thread, {} rounds of {} s after \
+         half a second",
         args.scene, args.size.width, args.size.height, args.rounds, args.secs
     );
-    rows.push(Row::new("sampler.adaptive.ns", "ns/sample", &rounds, &conditions));
-    Ok(rows)
+    Ok(Row::new(
+        "sampler.choose_observe_ns",
+        "ns/sample",
+        &rounds.collect::<Vec<f64>>(),
+        &conditions,
+    ))
+}
+
+fn in_4k(args: &BenchArgs) -> Row {
+    let rounds = (0..args.rounds).map(|seed| nanos_4k(args.secs, u64::from(seed)));
+    let conditions = format!(
+        "3840×2160, 938 samples per batch, adaptive+hold, never refreshed, from a known picture; in its left tenth the squares of a \
+         chessboard change colour ten times a second, which costs nothing to trace; one thread, {} rounds of {} s after half a \
+         second",
+        args.rounds, args.secs
+    );
+    Row::new(
+        "sampler.choose_observe_ns_4k",
+        "ns/sample",
+        &rounds.collect::<Vec<f64>>(),
+        &conditions,
+    )
 }
 
 /// Samples per second of the sketch: 938 per batch.
@@ -97,13 +124,33 @@ impl Sampler for Timed {
     }
 }
 
-fn choosing_nanos(world: &Arc<World>, args: &BenchArgs, seed: u64) -> f64 {
-    let (view, settings) = (ViewSource::Camera(0), Settings::default());
-    let tracer = CpuTracer::new(Arc::clone(world), view, settings, args.threads);
+/// What a sampler has cost so far.
+struct Cost {
+    nanos: u64,
+    kept: u64,
+}
+
+impl Cost {
+    fn per_sample_since(&self, before: &Cost) -> f64 {
+        (self.nanos - before.nanos) as f64 / (self.kept - before.kept) as f64
+    }
+}
+
+/// `adaptive` on the simulated clock, and the nanoseconds that it takes.
+fn timed_engine<T: Tracer>(canvas: Canvas, tracer: T, seed: u64) -> (Engine<T>, Arc<AtomicU64>) {
     let nanos = Arc::new(AtomicU64::new(0));
     let sampler = SamplerKind::ADAPTIVE.build(seed);
     let timed = Timed { sampler, real: Clock::real(), nanos: Arc::clone(&nanos) };
-    let mut engine = Engine::new(args.size, Clock::simulated(RATE), Box::new(timed), tracer);
+    (Engine::with_canvas(canvas, Clock::simulated(RATE), Box::new(timed), tracer), nanos)
+}
+
+/// Simulated seconds before a measurement, in which rates are learned.
+const WARM_SECS: f64 = 0.5;
+
+fn scene_nanos(world: &Arc<World>, args: &BenchArgs, seed: u64) -> f64 {
+    let (view, settings) = (ViewSource::Camera(0), Settings::default());
+    let tracer = CpuTracer::new(Arc::clone(world), view, settings, args.threads);
+    let (mut engine, nanos) = timed_engine(Canvas::new(args.size), tracer, seed);
     engine.set_reconstruction(ReconstructionKind::REPROJECT.build());
     let mut refreshes = 0;
     let mut run_until = |secs: f64| {
@@ -113,9 +160,29 @@ fn choosing_nanos(world: &Arc<World>, args: &BenchArgs, seed: u64) -> f64 {
             engine.run_until(time).expect("the tracer's colours are finite");
             engine.refresh(time);
         }
-        (nanos.load(Ordering::Relaxed), engine.counters().kept)
+        Cost { nanos: nanos.load(Ordering::Relaxed), kept: engine.counters().kept }
     };
-    let (warm_nanos, warm_kept) = run_until(0.5);
-    let (nanos, kept) = run_until(0.5 + args.secs);
-    (nanos - warm_nanos) as f64 / (kept - warm_kept) as f64
+    let warm = run_until(WARM_SECS);
+    run_until(WARM_SECS + args.secs).per_sample_since(&warm)
+}
+
+fn nanos_4k(secs: f64, seed: u64) -> f64 {
+    let size = Size::new(3840, 2160);
+    let render = |batch: &Batch| -> Vec<[f32; 3]> {
+        let turn = (batch.scene_secs * 10.0) as u32;
+        let colour = |request: &Request| {
+            let (x, y) = batch.size.xy(request.pixel);
+            let is_bright = (x / 32 + y / 32 + turn).is_multiple_of(2);
+            if x < batch.size.width / 10 { f32::from(u8::from(is_bright)) } else { 0.5 }
+        };
+        batch.requests.iter().map(|request| [colour(request); 3]).collect()
+    };
+    let canvas = Canvas::from_picture(size, vec![[0.5; 3]; size.pixels()]);
+    let (mut engine, nanos) = timed_engine(canvas, Function::new(render), seed);
+    let mut run_until = |secs: f64| {
+        engine.run_until(Time::from_secs(secs)).expect("finite colours");
+        Cost { nanos: nanos.load(Ordering::Relaxed), kept: engine.counters().kept }
+    };
+    let warm = run_until(WARM_SECS);
+    run_until(WARM_SECS + secs).per_sample_since(&warm)
 }

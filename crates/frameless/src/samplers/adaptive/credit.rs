@@ -1,8 +1,7 @@
-//! The even share of the tiles: a deterministic draw by credit, and Bayer's order inside a tile.
+//! The tiles' share: by what is learned of their change, with an even part for all.
 //!
 //! ```text
-//! c_i ← c_i + n · ((1 − ε) m_i √v_i / Σ m√v + ε / N)    for every tile i of N, n samples to be given out
-//! while c_i ≥ 1:  c_i ← c_i − 1, draw tile i
+//! share of tile i of N = (1 − ε) m_i √v_i / Σ m√v + ε / N
 //! ```
 //!
 //! The square root is the optimum for jump-like change: a pixel traced f times a second with an error that grows like v · age is
@@ -10,7 +9,8 @@
 //! ([`weights`](super::weights)); the even part is not weighted.
 
 use super::AdaptiveStage;
-use crate::bayer;
+use super::order::{self, Order};
+use super::shares::Shares;
 use crate::rates::Rates;
 use crate::{Canvas, Rng, Time, wide};
 
@@ -18,33 +18,22 @@ use crate::{Canvas, Rng, Time, wide};
 const EVENLY: f32 = 0.2;
 /// Added to v: so that a picture at rest is refined evenly.
 const LEAST_RATE: f32 = 1e-7;
-/// Pixels looked at before one is taken that is younger than half the mean age of its tile.
-const TRIES: u32 = 4;
 
-/// Credits and places in the order, per tile.
+/// Whose turn it is, among the tiles and in each of them.
 pub(crate) struct Credit {
-    credit: Vec<f32>,
-    place: Vec<u32>,
-    weight: Vec<f32>,
-    /// Tiles that have a whole credit.
-    rich: Vec<u32>,
-    /// Pixels of a tile in their order, relative to its corner.
-    order: Vec<(u32, u32)>,
-    /// Draws places instead of the order, if that is left out.
-    random: Option<Rng>,
-    /// Whether all tiles weigh the same.
+    shares: Shares,
+    order: Order,
+    /// Whether all tiles have the same share.
     evenly: bool,
+    tiles: Vec<u32>,
+    /// The first pixel of each, and its age.
+    first: Vec<(u32, u64)>,
 }
 
-/// m √v of every tile; without `weights` all m are 1.
-fn weigh(rates: &[f32], weights: &[f32], weighed: &mut [f32]) {
-    // Flat loops, one thing each: the compiler makes vectors of them.
-    for (weighed, rate) in weighed.iter_mut().zip(rates) {
-        *weighed = (rate + LEAST_RATE).sqrt();
-    }
-    for (weighed, m) in weighed.iter_mut().zip(weights) {
-        *weighed *= m;
-    }
+/// m √v.
+#[inline]
+fn weight(m: f32, rate: f32) -> f32 {
+    m * (rate + LEAST_RATE).sqrt()
 }
 
 impl Credit {
@@ -54,31 +43,44 @@ impl Credit {
         without: Option<AdaptiveStage>,
         rng: &mut Rng,
     ) -> Credit {
-        Credit {
-            credit: (0..tiles).map(|_| rng.unit_f32()).collect(),
-            place: (0..tiles).map(|_| rng.next_u32()).collect(),
-            weight: vec![0.0; tiles],
-            rich: Vec::new(),
-            order: bayer::order(side_bits),
-            random: (without == Some(AdaptiveStage::Bayer))
-                .then(|| Rng::new(u64::from(rng.next_u32()))),
-            evenly: without == Some(AdaptiveStage::Rates),
+        let shares = Shares::new(tiles, rng);
+        let mut order = Order::new(tiles, side_bits, rng);
+        if without == Some(AdaptiveStage::Bayer) {
+            order.forget(Rng::new(u64::from(rng.next_u32())));
         }
+        let evenly = without == Some(AdaptiveStage::Rates);
+        Credit { shares, order, evenly, tiles: Vec::new(), first: Vec::new() }
+    }
+
+    /// What tiles count has changed, all at once.
+    pub(crate) fn weigh_all(&mut self, rates: &Rates, m: impl Fn(usize) -> f32) {
+        self.shares.set_all(|tile| (weight(m(tile), rates.of_tile(tile)), 1.0));
+    }
+
+    /// A tile's v has changed.
+    #[inline]
+    pub(crate) fn weigh(&mut self, tile: usize, m: f32, rate: f32) {
+        self.shares.set(tile, weight(m, rate));
+    }
+
+    /// Begin to fetch what [`Credit::weigh`] changes.
+    #[inline]
+    pub(crate) fn prefetch(&self, tile: usize) {
+        self.shares.prefetch(tile);
+    }
+
+    /// (a, b) of [`Shares::draw`] for a number of samples.
+    fn scale(&self, count: f32) -> (f32, f32) {
+        let sums = self.shares.sums();
+        let evenly = if self.evenly || sums.weight <= 0.0 { 1.0 } else { EVENLY };
+        let per_weight = f64::from((1.0 - evenly) * count) / sums.weight.max(f64::MIN_POSITIVE);
+        (per_weight as f32, evenly * count / sums.even as f32)
     }
 
     /// The part of the samples that each tile gets, of those that holes and fronts leave.
-    pub(crate) fn shares(&self, rates: &[f32], weights: &[f32]) -> Vec<f32> {
-        let evenly = 1.0 / rates.len() as f32;
-        if self.evenly {
-            return vec![evenly; rates.len()];
-        }
-        let mut shares = vec![0.0; rates.len()];
-        weigh(rates, weights, &mut shares);
-        let sum: f32 = shares.iter().sum();
-        shares
-            .iter_mut()
-            .for_each(|share| *share = (1.0 - EVENLY) * *share / sum + EVENLY * evenly);
-        shares
+    pub(crate) fn shares(&self) -> Vec<f32> {
+        let (a, b) = self.scale(1.0);
+        self.shares.all(a, b)
     }
 
     /// Gives out about `count` samples; exactly on average.
@@ -86,71 +88,30 @@ impl Credit {
         &mut self,
         now: Time,
         canvas: &Canvas,
-        (rates, weights): (&Rates, &[f32]),
+        rates: &Rates,
         count: f32,
         mut take: impl FnMut(u32),
     ) {
-        let tiles = self.credit.len();
-        weigh(rates.all(), weights, &mut self.weight);
-        if self.evenly {
-            self.weight.fill(1.0);
+        let (a, b) = self.scale(count);
+        self.tiles.clear();
+        self.shares.draw(a, b, &mut self.tiles);
+        // What is looked at lies all over the picture. In loops so short many places are fetched at once.
+        for &tile in &self.tiles {
+            self.order.prefetch(tile as usize);
+            rates.prefetch(tile as usize);
         }
-        let sum: f32 = self.weight.iter().sum();
-        let (per_weight, evenly) = ((1.0 - EVENLY) * count / sum, EVENLY * count / tiles as f32);
-        for (credit, weight) in self.credit.iter_mut().zip(&self.weight) {
-            *credit += per_weight * weight + evenly;
+        self.first.clear();
+        for &tile in &self.tiles {
+            let pixel = self.order.next(&rates.grid, tile as usize);
+            wide::prefetch(canvas.known(), pixel as usize);
+            wide::prefetch(canvas.time(), pixel as usize);
+            self.first.push((pixel, 0));
         }
-        self.rich.clear();
-        let rich = (0..).zip(&self.credit).filter(|(_, credit)| **credit >= 1.0);
-        self.rich.extend(rich.map(|(tile, _)| tile));
-        // What is looked at lies all over the picture: fetched many at a time instead of one after the other.
-        for &tile in &self.rich {
-            let rect = rates.grid.rect(tile as usize);
-            let (dx, dy) = self.order[self.place[tile as usize] as usize & (self.order.len() - 1)];
-            let i = canvas
-                .size()
-                .index((rect.x0 + dx).min(rect.x1 - 1), (rect.y0 + dy).min(rect.y1 - 1))
-                as usize;
-            wide::prefetch(canvas.known(), i);
-            wide::prefetch(canvas.time(), i);
+        for (pixel, age_nanos) in &mut self.first {
+            *age_nanos = order::age_nanos(now, canvas, *pixel);
         }
-        for i in 0..self.rich.len() {
-            let tile = self.rich[i] as usize;
-            while self.credit[tile] >= 1.0 {
-                self.credit[tile] -= 1.0;
-                take(self.pixel(now, canvas, rates, tile));
-            }
+        for (&tile, &first) in self.tiles.iter().zip(&self.first) {
+            take(self.order.old_enough(now, canvas, rates, (tile as usize, first)));
         }
-    }
-
-    fn pixel(&mut self, now: Time, canvas: &Canvas, rates: &Rates, tile: usize) -> u32 {
-        let rect = rates.grid.rect(tile);
-        let (mut oldest, mut oldest_secs) = (canvas.size().index(rect.x0, rect.y0), -1.0);
-        let enough_secs = 0.5 * rates.mean_age_secs(tile);
-        let mut tries = 0;
-        while tries < TRIES {
-            // As many as a power of two.
-            let (dx, dy) = self.order[self.place[tile] as usize & (self.order.len() - 1)];
-            self.place[tile] = match &mut self.random {
-                Some(rng) => rng.next_u32(),
-                None => self.place[tile].wrapping_add(1),
-            };
-            let (x, y) = (rect.x0 + dx, rect.y0 + dy);
-            if x >= rect.x1 || y >= rect.y1 {
-                continue;
-            }
-            tries += 1;
-            let pixel = canvas.size().index(x, y);
-            let i = pixel as usize;
-            let age_secs =
-                if canvas.known()[i] { now.secs_since(canvas.time()[i]) as f32 } else { f32::MAX };
-            if age_secs > oldest_secs {
-                (oldest, oldest_secs) = (pixel, age_secs);
-            }
-            if age_secs > enough_secs {
-                break;
-            }
-        }
-        oldest
     }
 }

@@ -11,23 +11,29 @@
 //! All but the even share is weighted by what counts more in the picture ([`weights`]): of holes and fronts where it counts less than
 //! on average some are passed over; such holes come after the others.
 
+mod block;
 mod credit;
 mod flow;
 mod front;
+mod order;
 mod refine;
+mod shares;
 mod stage;
+mod turns;
 mod weights;
+mod why;
 
 use std::collections::VecDeque;
 
 use crate::rates::Rates;
 use crate::tile::TileGrid;
-use crate::{Canvas, Insight, Observation, Request, Rng, Sampler, Time, Weights};
+use crate::{Canvas, Insight, Observation, Refinement, Request, Rng, Sampler, Time, Weights, wide};
 use credit::Credit;
 use front::Front;
 use refine::Refine;
 pub use stage::AdaptiveStage;
 use weights::TileWeights;
+use why::{Reasons, Why};
 
 /// Side of a tile, as a power of two: 8 pixels.
 const TILE_BITS: u32 = 3;
@@ -39,6 +45,9 @@ const FRONT_SHARE: f32 = 0.6;
 const HOT_RATE: f32 = 0.01;
 /// Where this part of the tiles is hot fronts begin to lose their share; at twice as many they have none.
 const HOT_PART: f32 = 0.2;
+
+/// How many pixels ahead of the one at hand the next is fetched from memory: enough for a few dozen nanoseconds each.
+const AHEAD: usize = 12;
 
 /// The default of [`Sampler::set_temporal`].
 pub(crate) const DEFAULT_TEMPORAL: f32 = 0.5;
@@ -61,6 +70,8 @@ struct State {
     refine: Refine,
     weights: TileWeights,
     front_share: f32,
+    /// How many tiles are hot.
+    hot: usize,
     updates: u64,
     next_hole: usize,
     /// Holes that were passed over, since they count less.
@@ -68,14 +79,9 @@ struct State {
     /// Samples given out too few.
     owed: f32,
     /// Why each pixel was asked for last.
-    why: Vec<Why>,
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum Why {
-    Tile,
-    Front,
-    Hole,
+    why: Reasons,
+    /// Of the observations at hand.
+    tiles: Vec<u32>,
 }
 
 impl Adaptive {
@@ -99,7 +105,7 @@ impl State {
         rng: &mut Rng,
     ) -> State {
         let grid = TileGrid::new(canvas.size(), 1 << TILE_BITS);
-        State {
+        let mut state = State {
             generation: canvas.generation(),
             credit: Credit::new(grid.len(), TILE_BITS, without, rng),
             refine: Refine::new(&grid, TILE_BITS, rng),
@@ -107,16 +113,37 @@ impl State {
             rates: Rates::new(grid),
             front: Front::new(canvas.size()),
             front_share: FRONT_SHARE,
+            hot: 0,
             updates: 0,
             next_hole: 0,
             later_holes: VecDeque::new(),
             owed: 0.0,
-            why: vec![Why::Tile; canvas.size().pixels()],
+            why: Reasons::new(canvas.size()),
+            tiles: Vec::new(),
+        };
+        state.weigh_all();
+        state
+    }
+
+    /// What tiles count has changed.
+    fn weigh_all(&mut self) {
+        self.credit.weigh_all(&self.rates, |tile| self.weights.of_tile(tile));
+        self.refine.weigh_all(|tile| self.weights.of_tile(tile));
+    }
+
+    /// Looks at the canvas anew, after a reconstruction has said what its pixels show.
+    fn look(&mut self, canvas: &Canvas) {
+        self.updates = canvas.updates();
+        self.next_hole = 0;
+        self.later_holes.clear();
+        if self.weights.look(canvas, &self.rates.grid) {
+            self.weigh_all();
         }
+        self.refine.look(canvas, &self.rates, |tile| self.weights.of_tile(tile));
     }
 
     fn take(&mut self, pixel: u32, why: Why, requests: &mut Vec<Request>) {
-        self.why[pixel as usize] = why;
+        self.why.set(pixel, why);
         requests.push(Request::centre(pixel));
     }
 
@@ -125,8 +152,12 @@ impl State {
         while requests.len() < end {
             let Some(&pixel) = canvas.holes().get(self.next_hole) else { break };
             self.next_hole += 1;
+            if let Some(&later) = canvas.holes().get(self.next_hole + AHEAD) {
+                wide::prefetch(canvas.known(), later as usize);
+                wide::prefetch(canvas.time(), later as usize);
+            }
             if canvas.still_waits(pixel) {
-                match self.weights.lets_pass(self.rates.grid.tile_of(pixel)) {
+                match self.weights.lets_pass(&self.rates.grid, pixel) {
                     true => self.take(pixel, Why::Hole, requests),
                     false => self.later_holes.push_back(pixel),
                 }
@@ -147,8 +178,7 @@ impl State {
         temporal: f32,
         requests: &mut Vec<Request>,
     ) {
-        let hot = self.rates.all().iter().filter(|&&rate| rate > HOT_RATE).count();
-        let hot_part = hot as f32 / self.rates.all().len() as f32;
+        let hot_part = self.hot as f32 / self.rates.grid.len() as f32;
         // Who would rather finish what is there lets fronts wait.
         let wanted = (temporal / DEFAULT_TEMPORAL).min(1.0);
         self.front_share = wanted * FRONT_SHARE * (2.0 - hot_part / HOT_PART).clamp(0.0, 1.0);
@@ -159,10 +189,47 @@ impl State {
         let end = requests.len() + (self.front_share * rest as f32) as usize;
         while requests.len() < end {
             let Some(pixel) = self.front.next(canvas) else { return };
-            if self.weights.lets_pass(self.rates.grid.tile_of(pixel)) {
+            if self.weights.lets_pass(&self.rates.grid, pixel) {
                 self.take(pixel, Why::Front, requests);
             }
         }
+    }
+}
+
+/// Learning.
+impl State {
+    /// Begin to fetch what an observation will change; returns its tile.
+    #[inline]
+    fn fetch(&self, observed: &Observation) -> u32 {
+        let tile = self.rates.grid.tile_of(observed.pixel);
+        if observed.refinement.is_some() {
+            self.refine.prefetch(tile);
+            return tile as u32;
+        }
+        self.why.prefetch(observed.pixel);
+        self.rates.prefetch(tile);
+        self.credit.prefetch(tile);
+        tile as u32
+    }
+
+    fn observe_refinement(&mut self, observed: &Observation, tile: usize, refinement: &Refinement) {
+        self.refine.observe(tile, refinement, self.weights.of_tile(tile));
+        if refinement.suspect {
+            self.front.suspect(observed);
+        }
+    }
+
+    #[inline]
+    fn observe_change(&mut self, observed: &Observation, tile: usize) {
+        let weight = match self.why.of(observed.pixel) {
+            Why::Tile => 1.0,
+            Why::Front => 0.5,
+            Why::Hole => return,
+        };
+        let (before, after) = self.rates.observe(tile, observed, weight);
+        self.credit.weigh(tile, self.weights.of_tile(tile), after);
+        self.hot += usize::from(after > HOT_RATE);
+        self.hot -= usize::from(before > HOT_RATE);
     }
 }
 
@@ -176,11 +243,7 @@ impl Sampler for Adaptive {
         let state = self.state.get_or_insert_with(new);
         let start = requests.len();
         if state.updates != canvas.updates() {
-            state.updates = canvas.updates();
-            state.next_hole = 0;
-            state.later_holes.clear();
-            state.refine.look(canvas, &state.rates);
-            state.weights.look(canvas, &state.rates.grid);
+            state.look(canvas);
         }
         let unknown = canvas.holes().len() as f32 / canvas.size().pixels() as f32;
         let hole_share = HOLE_SHARE.max(unknown);
@@ -191,17 +254,16 @@ impl Sampler for Adaptive {
             let rest = count - (requests.len() - start);
             state.choose_fronts(canvas, rest, self.temporal, requests);
         }
-        let State { credit, refine, weights, rates, why, owed, .. } = state;
-        let weights = weights.all();
+        let State { credit, refine, rates, why, owed, .. } = state;
         let left = (count - (requests.len() - start)) as f32;
         let spatial = left * (1.0 - refine.temporal_part(self.temporal));
         if spatial > 0.0 {
-            refine.draw(canvas, (&rates.grid, weights), spatial, |request| requests.push(request));
+            refine.draw(canvas, &rates.grid, spatial, |request| requests.push(request));
         }
         let before = requests.len();
         let rest = count as f32 - (before - start) as f32;
-        credit.draw(now, canvas, (rates, weights), rest + *owed, |pixel| {
-            why[pixel as usize] = Why::Tile;
+        credit.draw(now, canvas, rates, rest + *owed, |pixel| {
+            why.set(pixel, Why::Tile);
             requests.push(Request::centre(pixel));
         });
         *owed += rest - (requests.len() - before) as f32;
@@ -212,30 +274,20 @@ impl Sampler for Adaptive {
         else {
             return;
         };
-        for observed in observations {
-            let tile = state.rates.grid.tile_of(observed.pixel);
-            if let Some(refinement) = &observed.refinement {
-                state.refine.observe(tile, refinement);
-                if refinement.suspect {
-                    state.front.suspect(observed);
-                }
-                continue;
+        // First what will be changed is fetched, all over the picture, then it is changed.
+        let mut tiles = std::mem::take(&mut state.tiles);
+        tiles.clear();
+        tiles.extend(observations.iter().map(|observed| state.fetch(observed)));
+        for (observed, &tile) in observations.iter().zip(&tiles) {
+            match &observed.refinement {
+                Some(refinement) => state.observe_refinement(observed, tile as usize, refinement),
+                None if observed.known => state.observe_change(observed, tile as usize),
+                None => {}
             }
-            let why = state.why[observed.pixel as usize];
-            if !observed.known {
-                continue;
-            }
-            let weight = match why {
-                Why::Tile => 1.0,
-                Why::Front => 0.5,
-                Why::Hole => 0.0,
-            };
-            if weight > 0.0 {
-                state.rates.observe(tile, observed, weight);
-            }
-            if state.front_share > 0.0 {
-                state.front.observe(observed, canvas);
-            }
+        }
+        state.tiles = tiles;
+        if state.front_share > 0.0 {
+            state.front.observe(observations, canvas);
         }
     }
 
@@ -248,6 +300,7 @@ impl Sampler for Adaptive {
         self.weights = weights.clone();
         if let Some(state) = &mut self.state {
             state.weights = TileWeights::new(weights, &state.rates.grid);
+            state.weigh_all();
         }
     }
 
@@ -262,7 +315,7 @@ impl Sampler for Adaptive {
     fn inspect(&self, _now: Time, canvas: &Canvas) -> Insight {
         let of = |state: &&State| state.generation == canvas.generation();
         let Some(state) = self.state.as_ref().filter(of) else { return Insight::default() };
-        let tiles = state.credit.shares(state.rates.all(), state.weights.all());
+        let tiles = state.credit.shares();
         let grid = &state.rates.grid;
         let pixels = 0..canvas.size().pixels() as u32;
         let tile_probability: Vec<f32> = pixels.map(|p| tiles[grid.tile_of(p)]).collect();
@@ -401,7 +454,11 @@ mod tests {
     fn weights_that_are_off_again_leave_what_was_learned() {
         let mut sampler = Adaptive::new(DEFAULT_TEMPORAL, 3);
         looked_at(&mut sampler, 100);
-        let rates = sampler.rates().expect("learned").all().to_vec();
+        let rates = |sampler: &Adaptive| -> Vec<f32> {
+            let learned = sampler.rates().expect("learned");
+            (0..64).map(|tile| learned.of_tile(tile)).collect()
+        };
+        let learned = rates(&sampler);
         let weights = Weights::default().with_importance(1, 2, vec![1.0, 9.0]).expect("valid");
         sampler.set_weights(&weights);
         let canvas = Canvas::from_picture(Size::new(64, 64), vec![[0.0; 3]; 4096]);
@@ -411,7 +468,7 @@ mod tests {
         sampler.set_weights(&Weights::default());
         let plain = shares(&sampler);
         assert!(plain[4095] < 1.5 * plain[0]);
-        assert_eq!(sampler.rates().expect("learned").all(), rates);
+        assert_eq!(rates(&sampler), learned);
     }
 
     #[test]

@@ -67,14 +67,14 @@ impl TileWeights {
         made
     }
 
-    /// m of every tile, at least 0; empty if all are 1.
-    pub(crate) fn all(&self) -> &[f32] {
-        &self.tile
-    }
-
-    /// Whether a hole or front in a tile is let through: all where m is at least 1, else m of them.
-    pub(crate) fn lets_pass(&mut self, tile: usize) -> bool {
-        let Some(&m) = self.tile.get(tile) else { return true };
+    /// Whether a hole or front is let through: all in tiles where m is at least 1, else m of them.
+    #[inline]
+    pub(crate) fn lets_pass(&mut self, grid: &TileGrid, pixel: u32) -> bool {
+        if self.tile.is_empty() {
+            return true;
+        }
+        let tile = grid.tile_of(pixel);
+        let m = self.tile[tile];
         let pass = &mut self.pass[tile];
         *pass += m.min(1.0);
         let passes = *pass >= 1.0;
@@ -82,10 +82,16 @@ impl TileWeights {
         passes
     }
 
-    /// Looks at the canvas anew, after a reconstruction has said what its tiles show.
-    pub(crate) fn look(&mut self, canvas: &Canvas, grid: &TileGrid) {
+    /// m of a tile.
+    #[inline]
+    pub(crate) fn of_tile(&self, tile: usize) -> f32 {
+        self.tile.get(tile).copied().unwrap_or(1.0)
+    }
+
+    /// Looks at the canvas anew, after a reconstruction has said what its tiles show. Whether any m may have changed.
+    pub(crate) fn look(&mut self, canvas: &Canvas, grid: &TileGrid) -> bool {
         if self.contrast == 0.0 && self.flow == 0.0 {
-            return;
+            return false;
         }
         self.tile.clone_from(&self.given);
         if self.contrast != 0.0 {
@@ -105,6 +111,7 @@ impl TileWeights {
             }
         }
         self.divide_by_mean();
+        true
     }
 
     fn divide_by_mean(&mut self) {
@@ -169,7 +176,7 @@ mod tests {
     fn nothing_set_is_nothing_kept() {
         let gaze = Gaze { at: [0.5; 2], radius: 1.0, strength: 0.0 };
         let off = Weights::default().with_gaze(gaze).expect("valid");
-        assert!(TileWeights::new(&off, &grid()).all().is_empty());
+        assert!(TileWeights::new(&off, &grid()).tile.is_empty());
     }
 
     #[test]
@@ -197,11 +204,11 @@ mod tests {
             let grid = TileGrid::new(Size::new(32, 8), 8);
             let m = TileWeights::new(&weights, &grid);
             assert!(
-                m.all().iter().zip([0.5, 0.5, 1.5, 1.5]).all(|(m, want)| (m - want).abs() < 1e-5)
+                m.tile.iter().zip([0.5, 0.5, 1.5, 1.5]).all(|(m, want)| (m - want).abs() < 1e-5)
             );
         }
         let nothing = Weights::default().with_importance(1, 1, vec![0.0]).expect("valid");
-        assert!(TileWeights::new(&nothing, &grid()).all().iter().all(|&m| m == 1.0));
+        assert!(TileWeights::new(&nothing, &grid()).tile.iter().all(|&m| m == 1.0));
     }
 
     #[test]
@@ -211,7 +218,7 @@ mod tests {
         let m = TileWeights::new(&Weights::default().with_gaze(gaze).expect("valid"), &grid);
         // From the middle of tile 0, tile 1 is 8 pixels away and tile 3 24.
         for (tile, ratio) in [(1, 0.5), (3, 0.25), (10, 0.5)] {
-            assert!((m.all()[tile] / m.all()[0] - ratio).abs() < 1e-5, "{tile}");
+            assert!((m.tile[tile] / m.tile[0] - ratio).abs() < 1e-5, "{tile}");
         }
     }
 
@@ -243,6 +250,6 @@ mod tests {
         let both = Weights::default().with_contrast(1.0).and_then(|w| w.with_flow(1.0));
         let mut m = TileWeights::new(&both.expect("valid"), &grid);
         m.look(&Canvas::new(grid.size), &grid);
-        assert!(m.all().iter().all(|&m| m == 1.0));
+        assert!(m.tile.iter().all(|&m| m == 1.0));
     }
 }
