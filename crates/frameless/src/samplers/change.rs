@@ -291,14 +291,19 @@ mod tests {
         sums.tile_probability(Time::ZERO, 0.9, &mut p);
         assert_eq!(p, [0.5, 0.5], "nothing known: every pixel is equally likely");
 
-        (0..8).for_each(|i| sums.update(&observation(i / 4 * 8 + i % 4, 100, 0, 0.0)));
+        (0..8).for_each(|i| sums.update(&observation(i / 4 * 8 + i % 4, Time(100), Time(0), 0.0)));
         sums.tile_probability(Time(200), 0.9, &mut p);
         let want = [(8 * 100 + 8 * 200) as f32 / 5600.0, 16.0 * 200.0 / 5600.0];
         assert_eq!(p, want, "no change: by age alone");
 
         (0..32).for_each(|i| {
             let previous = if i % 8 < 4 && i < 16 { 100 } else { 0 };
-            sums.update(&observation(i, 300, previous, if i % 8 < 4 { 1.0 } else { 0.0 }));
+            sums.update(&observation(
+                i,
+                Time(300),
+                Time(previous),
+                if i % 8 < 4 { 1.0 } else { 0.0 },
+            ));
         });
         sums.tile_probability(Time(300), 0.9, &mut p);
         assert_eq!(p, [1.0, 0.0], "no age: by change alone");
