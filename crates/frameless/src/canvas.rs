@@ -12,8 +12,9 @@ pub struct Canvas {
     time: Vec<Time>,
     known: Vec<bool>,
     holes: Vec<u32>,
+    last_minute: Vec<u32>,
     updates: u64,
-    holes_at: Time,
+    shown_at: Time,
     samples: Vec<u16>,
     samples_wanted: u16,
     tile_contrast: Vec<f32>,
@@ -43,8 +44,9 @@ impl Canvas {
             time: vec![Time::ZERO; size.pixels()],
             known: vec![true; size.pixels()],
             holes: Vec::new(),
+            last_minute: Vec::new(),
             updates: 0,
-            holes_at: Time::ZERO,
+            shown_at: Time::ZERO,
             samples: vec![0; size.pixels()],
             samples_wanted: 0,
             tile_contrast: Vec::new(),
@@ -86,9 +88,19 @@ impl Canvas {
         &self.holes
     }
 
+    /// Pixels best traced shortly before the next refresh: what they show goes on moving until then, and nothing carries it along.
+    pub fn last_minute(&self) -> &[u32] {
+        &self.last_minute
+    }
+
+    /// When a reconstruction has last said what the pixels show.
+    pub(crate) fn shown_at(&self) -> Time {
+        self.shown_at
+    }
+
     /// Whether a pixel has not been traced since [`Canvas::holes`] was made.
     pub fn still_waits(&self, pixel: u32) -> bool {
-        !self.known[pixel as usize] || self.time[pixel as usize] <= self.holes_at
+        !self.known[pixel as usize] || self.time[pixel as usize] <= self.shown_at
     }
 
     /// Of how many samples each pixel shows the mean, row-major; 0 where the picture does not rest.
@@ -132,7 +144,7 @@ impl Canvas {
         known: &mut Vec<bool>,
     ) {
         assert_eq!((time.len(), known.len()), (self.size.pixels(), self.size.pixels()));
-        self.holes_at = now;
+        self.shown_at = now;
         std::mem::swap(&mut self.holes, holes);
         std::mem::swap(&mut self.time, time);
         std::mem::swap(&mut self.known, known);
@@ -143,6 +155,11 @@ impl Canvas {
     pub(crate) fn set_samples(&mut self, wanted: u16, count: &[u16]) {
         self.samples_wanted = wanted;
         self.samples.clone_from_slice(count);
+    }
+
+    /// Pixels to be traced shortly before the next refresh. The old vector is handed back, to be used again.
+    pub(crate) fn set_last_minute(&mut self, pixels: &mut Vec<u32>) {
+        std::mem::swap(&mut self.last_minute, pixels);
     }
 
     /// What the tiles show; see [`Canvas::tile_contrast`] and [`Canvas::tile_motion`].
@@ -205,8 +222,9 @@ impl Canvas {
             time: source.iter().map(|&i| self.time[i]).collect(),
             known: source.iter().map(|&i| self.known[i]).collect(),
             holes: coarse_to_fine(size),
+            last_minute: Vec::new(),
             updates: self.updates + 1,
-            holes_at: self.holes_at,
+            shown_at: self.shown_at,
             samples: vec![0; size.pixels()],
             samples_wanted: 0,
             tile_contrast: Vec::new(),

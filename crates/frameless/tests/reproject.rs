@@ -145,6 +145,34 @@ fn the_sampler_is_told_how_tiles_move_if_it_wants_to_know() {
 }
 
 #[test]
+fn the_edge_of_a_moving_shadow_is_looked_at_just_before_it_is_shown() {
+    // Moves half a pixel from one refresh to the next, as the lamp turns.
+    let edge = |secs: f64, [x, _]: [f32; 2]| f32::from(u8::from(x > 10.2 + 30.0 * secs as f32));
+    let turning = |secs: f64| {
+        let (sin, cos) = (0.1 * secs as f32).sin_cos();
+        [sin, 0.0, cos]
+    };
+    let world = World { light: edge, lamp_direction: turning, ..world(STILL, NO_DISC) };
+    let options = ReprojectOptions { relight: true, ..ReprojectOptions::default() };
+    let wrong = |without: Option<AdaptiveStage>| {
+        let mut engine = engine(world, ReconstructionKind::Reproject(options), 83_000.0);
+        let adaptive = AdaptiveOptions { without, ..AdaptiveOptions::default() };
+        engine.set_sampler(SamplerKind::Adaptive(adaptive).build(1));
+        let wrong = (0..30).map(|refresh| {
+            let (picture, secs) = play(&mut engine, 1);
+            let ideal = world.ideal(secs);
+            let differ = |(a, b): &(&[f32; 3], &[f32; 3])| (a[1] - b[1]).abs() > 0.05;
+            let wrong = picture.iter().zip(&ideal).filter(differ).count();
+            if refresh < 10 { 0 } else { wrong }
+        });
+        wrong.sum::<usize>()
+    };
+    let (with, without) = (wrong(None), wrong(Some(AdaptiveStage::Late)));
+    println!("{with} pixels wrong with late looks, {without} without");
+    assert!(4 * with < without, "{with} with late looks, {without} without");
+}
+
+#[test]
 fn every_stage_that_is_left_out_makes_a_difference() {
     // Turns, approaches and stops, so that every stage has something to do.
     let camera: Camera = |secs| {
@@ -164,7 +192,8 @@ fn every_stage_that_is_left_out_makes_a_difference() {
     };
     let whole = last(None, None);
     assert_eq!(differences(&whole, &last(None, None)), (0, 0.0));
-    for stage in AdaptiveStage::ALL {
+    // No shadow moves here: see the test of late looks.
+    for stage in AdaptiveStage::ALL.into_iter().filter(|stage| *stage != AdaptiveStage::Late) {
         assert!(differences(&whole, &last(Some(stage), None)).0 > 0, "{stage:?}");
     }
     for stage in ReprojectStage::ALL {

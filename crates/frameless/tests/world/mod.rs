@@ -22,8 +22,10 @@ pub(crate) struct World {
     pub(crate) surfaces: fn(u32) -> bool,
     /// What part of the light reaches a point (x, y) of the plane at a time.
     pub(crate) light: fn(f64, [f32; 2]) -> f32,
-    /// How brightly the one lamp shines, from straight above, at a time.
+    /// How brightly the one lamp shines at a time.
     pub(crate) lamp: fn(f64) -> f32,
+    /// Unit vector to it; +z is straight above.
+    pub(crate) lamp_direction: fn(f64) -> [f32; 3],
     /// Colours are multiplied by 1 ± this, at random; 0: no noise.
     pub(crate) noise: f32,
 }
@@ -66,11 +68,12 @@ impl World {
             let lit = texture * (self.light)(secs, [x, y]);
             (0, [x, y, 0.0], [0.0, lit, 0.5 * lit])
         };
-        let (albedo, lamp) = (rgb, (self.lamp)(secs));
+        let lit = u32::from((self.light)(secs, [x, y]) > 0.0);
+        let (albedo, lamp) = (rgb, (self.lamp)(secs) * (self.lamp_direction)(secs)[2]);
         let noise = 1.0 + self.noise * random(request);
         let rgb = rgb.map(|c: f32| c * noise * lamp);
         let normal = [0.0, 0.0, 1.0];
-        (rgb, Surface { object, primitive: 0, position, normal, albedo, direct: rgb, lit: 1 })
+        (rgb, Surface { object, primitive: 0, position, normal, albedo, direct: rgb, lit })
     }
 
     pub(crate) fn pose(&self, secs: f64) -> Pose {
@@ -119,7 +122,7 @@ impl Tracer for Renderer {
 
     fn lighting(&mut self, scene_secs: f64, lighting: &mut Lighting) -> bool {
         let intensity = [(self.world.lamp)(scene_secs) * std::f32::consts::PI; 3];
-        let backwards = [0.0, 0.0, 1.0];
+        let backwards = (self.world.lamp_direction)(scene_secs);
         let range = f32::INFINITY;
         let lamp = Light { position: None, backwards, intensity, range, cone: None };
         let as_it_is = Placement {
@@ -137,7 +140,15 @@ impl Tracer for Renderer {
 }
 
 pub(crate) fn world(camera: Camera, disc: fn(f64) -> [f32; 3]) -> World {
-    World { camera, disc, surfaces: |_| true, light: |_, _| 1.0, lamp: |_| 1.0, noise: 0.0 }
+    World {
+        camera,
+        disc,
+        surfaces: |_| true,
+        light: |_, _| 1.0,
+        lamp: |_| 1.0,
+        lamp_direction: |_| [0.0, 0.0, 1.0],
+        noise: 0.0,
+    }
 }
 
 /// In [−1, 1), from the pixel and the sample's number.

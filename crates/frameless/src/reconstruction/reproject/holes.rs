@@ -10,8 +10,6 @@ pub(super) enum Hole {
     Large,
     /// It has no sample, but its neighbours know enough for a good guess.
     Small,
-    /// It lies at the edge of a shadow whose light has moved.
-    ShadowEdge,
     /// Its samples are not at its centre, and nothing moves that could have carried them there.
     OffCentre,
 }
@@ -19,7 +17,7 @@ pub(super) enum Hole {
 const BITS: u32 = 3;
 const RANKS: usize = 1 << (2 * BITS);
 /// Kinds of holes times places in Bayer's order.
-const CLASSES: usize = 4 * RANKS;
+const CLASSES: usize = 3 * RANKS;
 
 /// Pixels that wait to be traced.
 pub(super) struct Waiting {

@@ -49,6 +49,7 @@ pub struct Reproject {
     refreshes: u64,
     contrast: Vec<f32>,
     holes: Vec<u32>,
+    edges: Vec<u32>,
     no_rates: Option<Rates>,
 }
 
@@ -72,6 +73,7 @@ impl Reproject {
             refreshes: 0,
             contrast: Vec::new(),
             holes: Vec::new(),
+            edges: Vec::new(),
             no_rates: None,
         }
     }
@@ -206,7 +208,8 @@ impl Reconstruction for Reproject {
         }
         tile_contrast(&self.shown, &rates.grid, &mut self.contrast);
         self.gather.run(&self.store, refresh.now, rates, &self.contrast, &self.shown, picture);
-        self.relight.find_shadow_edges(&self.store, &mut self.gather.waiting);
+        self.relight.find_shadow_edges(&self.store, &mut self.edges);
+        canvas.set_last_minute(&mut self.edges);
         let recentres = self.options.without != Some(ReprojectStage::Recentre);
         if recentres && self.settled.any_rests() {
             self.gather.find_off_centre(&self.store, |object| self.settled.rests(object));

@@ -6,7 +6,6 @@
 //!
 //! What the object emits and reflects, and ambient light, stay as they were until the pixel is traced again; so do shadows.
 
-use super::holes::{Hole, Waiting};
 use super::store::{EMPTY, Sample, Shade, Store};
 use crate::{Display, Light, Lighting, Surface};
 
@@ -79,8 +78,9 @@ impl Relight {
         }
     }
 
-    /// Pixels at the edges of shadows whose lights have moved: there the shadow is somewhere else by now.
-    pub(super) fn find_shadow_edges(&self, store: &Store, waiting: &mut Waiting) {
+    /// Pixels at the edges of shadows whose lights have moved: there the shadow will be somewhere else soon.
+    pub(super) fn find_shadow_edges(&self, store: &Store, edges: &mut Vec<u32>) {
+        edges.clear();
         if self.moved == 0 {
             return;
         }
@@ -95,7 +95,7 @@ impl Relight {
                 let cell = layout.of_pixel(x as i32, y as i32);
                 let around = [cell - 1, cell + 1, cell - layout.stride, cell + layout.stride];
                 if store.object[cell] < EMPTY && around.iter().any(|&other| differ(cell, other)) {
-                    waiting.push(size.index(x, y), x, y, Hole::ShadowEdge);
+                    edges.push(size.index(x, y));
                 }
             }
         }

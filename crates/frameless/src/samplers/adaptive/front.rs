@@ -6,8 +6,10 @@ use crate::{Canvas, Observation, Size, Time, wide};
 
 /// A sample that differs by more than this (mean squared difference per channel) is part of a front: 5 % of the range.
 const FRONT_CHANGE: f32 = 0.0025;
-/// Neighbours traced later than this before the front was found are left alone.
-const FRESH_NANOS: u64 = 12_000_000;
+/// Neighbours traced later than a time before the front was found are left alone; its bounds.
+const FRESH_NANOS: [f32; 2] = [1e6, 12e6];
+/// How fast that adapts, per batch.
+const ADAPT: f32 = 1.03;
 
 /// How many pixels ahead of the one looked at the next is fetched.
 const AHEAD: usize = 8;
@@ -17,6 +19,8 @@ pub(crate) struct Front {
     queue: VecDeque<(u32, Time)>,
     queued: Bits,
     capacity: usize,
+    /// Neighbours younger than this are left alone.
+    fresh_nanos: f32,
     // Of the observations at hand.
     changed: Vec<Observation>,
     stale: Vec<u32>,
@@ -40,13 +44,13 @@ impl Bits {
 
 /// Whether what was known there is wrong now.
 #[inline]
-fn is_part(observed: &Observation) -> bool {
+pub(super) fn is_part(observed: &Observation) -> bool {
     observed.known && observed.change > 3.0 * FRONT_CHANGE
 }
 
 /// Bit 3 (j + 1) + i + 1: the neighbour i columns to the right and j rows below has not been traced for a while.
 #[inline]
-fn stale_around(observed: &Observation, canvas: &Canvas) -> u32 {
+fn stale_around(observed: &Observation, canvas: &Canvas, fresh: u64) -> u32 {
     let size = canvas.size();
     let (x, y) = size.xy(observed.pixel);
     let is_inside = x > 0 && y > 0 && x + 1 < size.width && y + 1 < size.height;
@@ -55,14 +59,14 @@ fn stale_around(observed: &Observation, canvas: &Canvas) -> u32 {
         if is_inside {
             let begin = size.index(x - 1, y + j - 1) as usize;
             for (i, &time) in (0..).zip(&canvas.time()[begin..begin + 3]) {
-                stale |= u32::from(age_nanos(observed.now, time) >= FRESH_NANOS) << (3 * j + i);
+                stale |= u32::from(age_nanos(observed.now, time) >= fresh) << (3 * j + i);
             }
             continue;
         }
         for i in (0..3).filter(|i| (1..=size.width).contains(&(x + i))) {
             if (1..=size.height).contains(&(y + j)) {
                 let time = canvas.time()[size.index(x + i - 1, y + j - 1) as usize];
-                stale |= u32::from(age_nanos(observed.now, time) >= FRESH_NANOS) << (3 * j + i);
+                stale |= u32::from(age_nanos(observed.now, time) >= fresh) << (3 * j + i);
             }
         }
     }
@@ -79,14 +83,35 @@ impl Front {
         let capacity = (size.pixels() / 8).max(4096);
         let queued = Bits(vec![0; size.pixels().div_ceil(8)]);
         let (changed, stale) = (Vec::new(), Vec::new());
-        Front { queue: VecDeque::new(), queued, capacity, changed, stale }
+        Front {
+            queue: VecDeque::new(),
+            queued,
+            capacity,
+            changed,
+            stale,
+            fresh_nanos: FRESH_NANOS[1],
+        }
     }
 
-    /// Queue the neighbours of samples that are part of a front.
-    pub(crate) fn observe(&mut self, observations: &[Observation], canvas: &Canvas) {
+    /// After a batch: where all fronts have been followed and samples are left, younger neighbours are looked at again as well; where
+    /// fronts have to wait, only older ones.
+    pub(crate) fn adapt(&mut self, all_followed: bool) {
+        let factor = if all_followed { 1.0 / ADAPT } else { ADAPT };
+        self.fresh_nanos = (self.fresh_nanos * factor).clamp(FRESH_NANOS[0], FRESH_NANOS[1]);
+    }
+
+    /// Queue the neighbours of samples that are part of a front, but of late looks.
+    pub(crate) fn observe(
+        &mut self,
+        observations: &[Observation],
+        canvas: &Canvas,
+        is_late: impl Fn(u32) -> bool,
+    ) {
         let mut changed = std::mem::take(&mut self.changed);
         changed.clear();
-        changed.extend(observations.iter().filter(|observed| is_part(observed)));
+        changed.extend(
+            observations.iter().filter(|observed| is_part(observed) && !is_late(observed.pixel)),
+        );
         for observed in &changed {
             let (pixel, width) = (observed.pixel as usize, canvas.size().width as usize);
             for pixel in [pixel.saturating_sub(width), pixel, pixel + width] {
@@ -97,7 +122,8 @@ impl Front {
         // Looking lies apart from queueing, without a branch that depends on what is seen, so that many pixels are fetched at once.
         let mut stale = std::mem::take(&mut self.stale);
         stale.clear();
-        stale.extend(changed.iter().map(|observed| stale_around(observed, canvas)));
+        let fresh = self.fresh_nanos as u64;
+        stale.extend(changed.iter().map(|observed| stale_around(observed, canvas, fresh)));
         for (observed, &stale) in changed.iter().zip(&stale) {
             self.queue_around(observed, stale, canvas.size());
         }
@@ -136,7 +162,8 @@ impl Front {
             }
             self.queued.set(pixel, false);
             let traced = canvas.time()[pixel as usize];
-            if age_nanos(found, traced) > FRESH_NANOS || !canvas.known()[pixel as usize] {
+            if age_nanos(found, traced) > self.fresh_nanos as u64 || !canvas.known()[pixel as usize]
+            {
                 return Some(pixel);
             }
         }
@@ -165,7 +192,7 @@ mod tests {
         let mut front = Front::new(size);
         let now = Time::from_secs(1.0);
         canvas.replace(1, Time::from_secs(0.995), [0.0; 3]);
-        front.observe(&[found(0, now, 0.1)], &canvas);
+        front.observe(&[found(0, now, 0.1)], &canvas, |_| false);
         let queued: Vec<u32> = std::iter::from_fn(|| front.next(&canvas)).collect();
         assert_eq!(queued, [4, 5], "1 is 5 ms old, and the corner has no other");
         assert!(is_part(&found(0, now, 0.1)));
@@ -179,7 +206,7 @@ mod tests {
         let size = Size::new(3, 1);
         let mut canvas = Canvas::from_picture(size, vec![[0.0; 3]; 3]);
         let mut front = Front::new(size);
-        front.observe(&[found(1, Time::from_secs(1.0), 0.1)], &canvas);
+        front.observe(&[found(1, Time::from_secs(1.0), 0.1)], &canvas, |_| false);
         canvas.replace(0, Time::from_secs(1.0), [0.0; 3]);
         assert_eq!((front.next(&canvas), front.next(&canvas)), (Some(2), None));
     }
@@ -190,7 +217,7 @@ mod tests {
         let canvas = Canvas::from_picture(size, vec![[0.0; 3]; 12]);
         for pixel in 0..12 {
             let mut front = Front::new(size);
-            front.observe(&[found(pixel, now, 0.1)], &canvas);
+            front.observe(&[found(pixel, now, 0.1)], &canvas, |_| false);
             let queued: Vec<u32> = std::iter::from_fn(|| front.next(&canvas)).collect();
             let near = |other: &u32| {
                 let ((x, y), (u, v)) = (size.xy(pixel), size.xy(*other));
@@ -198,5 +225,30 @@ mod tests {
             };
             assert_eq!(queued, (0..12).filter(near).collect::<Vec<u32>>(), "pixel {pixel}");
         }
+    }
+
+    #[test]
+    fn late_looks_begin_no_fronts() {
+        let canvas = Canvas::from_picture(Size::new(3, 1), vec![[0.0; 3]; 3]);
+        let mut front = Front::new(canvas.size());
+        front.observe(&[found(1, Time::from_secs(1.0), 0.1)], &canvas, |pixel| pixel == 1);
+        assert_eq!(front.next(&canvas), None);
+    }
+
+    #[test]
+    fn where_all_fronts_are_followed_younger_neighbours_are_looked_at_again() {
+        let mut canvas = Canvas::from_picture(Size::new(3, 1), vec![[0.0; 3]; 3]);
+        let mut front = Front::new(canvas.size());
+        let now = Time::from_secs(1.0);
+        (0..3).for_each(|pixel| _ = canvas.replace(pixel, Time::from_secs(0.995), [0.0; 3]));
+        let next = |front: &mut Front| {
+            front.observe(&[found(1, now, 0.1)], &canvas, |_| false);
+            std::iter::from_fn(|| front.next(&canvas)).count()
+        };
+        assert_eq!(next(&mut front), 0, "5 ms are young at first");
+        (0..100).for_each(|_| front.adapt(true));
+        assert_eq!(next(&mut front), 2);
+        (0..100).for_each(|_| front.adapt(false));
+        assert_eq!(next(&mut front), 0, "and again where fronts have to wait");
     }
 }

@@ -5,16 +5,18 @@
 //! 1. **Holes** ([`Canvas::holes`]), pixels of which nothing is known: at most 40 %, or the part of the picture that they are.
 //! 2. **Fronts** ([`front`]), at most 60 % of the rest: neighbours of samples that found a change. Gated off where most of
 //!    the picture changes, since there is nothing to follow then.
-//! 3. **Refinement** ([`refine`]): more samples for what is at rest, as the control has it.
-//! 4. **Tiles** ([`credit`]): by √v, with an even share for all.
+//! 3. **Late looks** ([`late`]), in the last batches before a refresh: at most 40 % of the rest.
+//! 4. **Refinement** ([`refine`]): more samples for what is at rest, as the control has it.
+//! 5. **Tiles** ([`credit`]): by √v, with an even share for all.
 //!
-//! All but the even share is weighted by what counts more in the picture ([`weights`]): of holes and fronts where it counts less than
-//! on average some are passed over; such holes come after the others.
+//! All but the even share is weighted by what counts more in the picture ([`weights`]): of holes, fronts and late looks where it counts
+//! less than on average some are passed over; such holes come after the others.
 
 mod block;
 mod credit;
 mod flow;
 mod front;
+mod late;
 mod order;
 mod refine;
 mod shares;
@@ -30,6 +32,7 @@ use crate::tile::TileGrid;
 use crate::{Canvas, Insight, Observation, Refinement, Request, Rng, Sampler, Time, Weights, wide};
 use credit::Credit;
 use front::Front;
+use late::Late;
 use refine::Refine;
 pub use stage::AdaptiveStage;
 use weights::TileWeights;
@@ -67,6 +70,7 @@ struct State {
     rates: Rates,
     credit: Credit,
     front: Front,
+    late: Late,
     refine: Refine,
     weights: TileWeights,
     front_share: f32,
@@ -112,6 +116,7 @@ impl State {
             weights: TileWeights::new(weights, &grid),
             rates: Rates::new(grid),
             front: Front::new(canvas.size()),
+            late: Late::new(),
             front_share: FRONT_SHARE,
             hot: 0,
             updates: 0,
@@ -135,6 +140,7 @@ impl State {
     fn look(&mut self, canvas: &Canvas) {
         self.updates = canvas.updates();
         self.next_hole = 0;
+        self.late.look(canvas);
         self.later_holes.clear();
         if self.weights.look(canvas, &self.rates.grid) {
             self.weigh_all();
@@ -179,21 +185,43 @@ impl State {
         requests: &mut Vec<Request>,
     ) {
         let hot_part = self.hot as f32 / self.rates.grid.len() as f32;
-        // Who would rather finish what is there lets fronts wait.
-        let wanted = (temporal / DEFAULT_TEMPORAL).min(1.0);
-        self.front_share = wanted * FRONT_SHARE * (2.0 - hot_part / HOT_PART).clamp(0.0, 1.0);
+        self.front_share =
+            wanted(temporal) * FRONT_SHARE * (2.0 - hot_part / HOT_PART).clamp(0.0, 1.0);
         if self.front_share == 0.0 {
             self.front.clear();
             return;
         }
         let end = requests.len() + (self.front_share * rest as f32) as usize;
         while requests.len() < end {
-            let Some(pixel) = self.front.next(canvas) else { return };
+            let Some(pixel) = self.front.next(canvas) else { return self.front.adapt(true) };
             if self.weights.lets_pass(&self.rates.grid, pixel) {
                 self.take(pixel, Why::Front, requests);
             }
         }
+        self.front.adapt(false);
     }
+
+    fn choose_late(
+        &mut self,
+        now: Time,
+        canvas: &Canvas,
+        rest: usize,
+        temporal: f32,
+        requests: &mut Vec<Request>,
+    ) {
+        let State { late, weights, rates, why, .. } = self;
+        late.choose(now, canvas, rest, wanted(temporal), |pixel| {
+            if weights.lets_pass(&rates.grid, pixel) {
+                why.set(pixel, Why::Late);
+                requests.push(Request::centre(pixel));
+            }
+        });
+    }
+}
+
+/// Who would rather finish what is there lets what changes wait: a part of its share, in [0, 1].
+fn wanted(temporal: f32) -> f32 {
+    (temporal / DEFAULT_TEMPORAL).min(1.0)
 }
 
 /// Learning.
@@ -224,7 +252,7 @@ impl State {
         let weight = match self.why.of(observed.pixel) {
             Why::Tile => 1.0,
             Why::Front => 0.5,
-            Why::Hole => return,
+            Why::Hole | Why::Late => return,
         };
         let (before, after) = self.rates.observe(tile, observed, weight);
         self.credit.weigh(tile, self.weights.of_tile(tile), after);
@@ -253,6 +281,10 @@ impl Sampler for Adaptive {
         if without != Some(AdaptiveStage::Fronts) {
             let rest = count - (requests.len() - start);
             state.choose_fronts(canvas, rest, self.temporal, requests);
+        }
+        if without != Some(AdaptiveStage::Late) {
+            let rest = count - (requests.len() - start);
+            state.choose_late(now, canvas, rest, self.temporal, requests);
         }
         let State { credit, refine, rates, why, owed, .. } = state;
         let left = (count - (requests.len() - start)) as f32;
@@ -287,7 +319,8 @@ impl Sampler for Adaptive {
         }
         state.tiles = tiles;
         if state.front_share > 0.0 {
-            state.front.observe(observations, canvas);
+            let why = &state.why;
+            state.front.observe(observations, canvas, |pixel| why.of(pixel) == Why::Late);
         }
     }
 

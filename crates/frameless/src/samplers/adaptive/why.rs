@@ -8,6 +8,7 @@ pub(super) enum Why {
     Tile = 0,
     Front = 1,
     Hole = 2,
+    Late = 3,
 }
 
 /// One of every pixel.
@@ -24,7 +25,8 @@ impl Reasons {
         match self.0[pixel as usize / 4] >> (pixel % 4 * 2) & 3 {
             0 => Why::Tile,
             1 => Why::Front,
-            _ => Why::Hole,
+            2 => Why::Hole,
+            _ => Why::Late,
         }
     }
 
