@@ -159,10 +159,10 @@ fn play(engine: &mut Engine<SubjectTracer<'_>>, secs: f64) -> Result<Picture, Fa
     Ok(picture)
 }
 
-/// The dimmed picture, and on it who waits to be traced.
+/// The dimmed picture, and on it who waits to be traced, at once or just before the next refresh.
 fn waiting(canvas: &Canvas, picture: &Picture) -> Picture {
     let mut marked: Picture = picture.iter().map(|rgb| rgb.map(|c| 0.35 * c)).collect();
-    for &pixel in canvas.holes() {
+    for &pixel in canvas.holes().iter().chain(canvas.last_minute()) {
         marked[pixel as usize] = Why::Hole.colour();
     }
     marked

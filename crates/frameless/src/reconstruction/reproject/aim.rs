@@ -1,5 +1,6 @@
 //! Aiming: where to trace, so that the hit lies on a pixel's centre at the next refresh.
 
+use super::store::SCREEN;
 use super::{AHEAD, Reproject};
 use crate::tile::TileGrid;
 use crate::{Request, Time, wide};
@@ -60,6 +61,10 @@ impl Reproject {
     fn motion(&self, pixel: u32) -> Option<[f32; 2]> {
         let (x, y) = self.store.layout.size.xy(pixel);
         let cell = self.store.newest(x, y).or_else(|| self.uncovered(x, y))?;
+        let object = self.store.object[cell];
+        if object != SCREEN && self.settled.rests(object) {
+            return Some([0.0; 2]);
+        }
         let surface = self.store.surface(cell);
         let here = self.poses[0].project(&surface)?.px;
         let before = self.poses[1].project(&surface)?.px;

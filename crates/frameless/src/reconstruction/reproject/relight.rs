@@ -92,9 +92,11 @@ impl Relight {
         };
         for y in 0..size.height {
             for x in 0..size.width {
-                let cell = layout.of_pixel(x as i32, y as i32);
-                let around = [cell - 1, cell + 1, cell - layout.stride, cell + layout.stride];
-                if store.object[cell] < EMPTY && around.iter().any(|&other| differ(cell, other)) {
+                let is_edge = store.of_pixel(x, y).any(|cell| {
+                    let around = [cell - 1, cell + 1, cell - layout.stride, cell + layout.stride];
+                    store.object[cell] < EMPTY && around.iter().any(|&other| differ(cell, other))
+                });
+                if is_edge {
                     edges.push(size.index(x, y));
                 }
             }

@@ -85,6 +85,7 @@ impl Reproject {
         let outdated = raw > 3.0 * OUTDATED;
         let moving = self.options.without != Some(ReprojectStage::Range)
             && self.refreshes >= 2
+            && !self.settled.rests(sample.object)
             && self.poses[1].project(&surface).is_some_and(|before| {
                 let [dx, dy] = [before.px[0] - px[0], before.px[1] - px[1]];
                 dx * dx + dy * dy > AT_REST_PX * AT_REST_PX

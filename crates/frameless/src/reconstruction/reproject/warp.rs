@@ -487,3 +487,48 @@ fn are_covered<U: Unit>(store: &Store, first: usize, around: &Around) -> M8<U> {
     let all_but_few = nearer.less_than(M8::splat(-5i32 as u32)).and(enough);
     candidates.and(all_but_few)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Projection, Size};
+
+    /// Samples of object 0 at positions x of a row of eight pixels, each newer than the one before, where a pose that makes everything
+    /// half as wide takes them.
+    fn halved(positions: &[f32]) -> Vec<Option<(u32, f32)>> {
+        let mut store = Store::new(Size::new(8, 1), 1);
+        for (tick, &x) in (1..).zip(positions) {
+            let cell = store.layout.of_px([x, 0.5]).expect("inside");
+            store.object[cell] = 0;
+            store.tick[cell] = tick;
+            store.anchor[cell] = Anchor([x, 0.5, 0.0, 0.0]);
+        }
+        let half = Projection([
+            [0.5, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ]);
+        let pose = Pose { picture_from_object: vec![half], ..Pose::default() };
+        Warp::default().run(&mut store, &pose, |_| false);
+        let mut slots = store.slot.clone();
+        slots.sort_unstable();
+        assert!(
+            slots.iter().copied().eq(0..slots.len() as u32),
+            "every cell has a slot of its own"
+        );
+        let cell = |x| store.layout.of_pixel(x, 0);
+        let sample = |x| (store.tick[cell(x)], store.px[0][cell(x)]);
+        (0..8).map(|x| (!store.is_empty(cell(x))).then(|| sample(x))).collect()
+    }
+
+    #[test]
+    fn who_loses_its_cell_steps_aside_if_there_is_room() {
+        // 0.25 and 0.75 meet in the first cell: the newer stays, the other goes to its right.
+        assert_eq!(halved(&[1.5, 0.5])[..3], [Some((2, 0.25)), Some((1, 0.75)), None]);
+        // To the left there is nothing.
+        assert_eq!(halved(&[0.5, 1.5])[..2], [Some((2, 0.75)), None]);
+        // And here the cell to the right is taken.
+        assert_eq!(halved(&[1.5, 0.5, 2.5])[..3], [Some((2, 0.25)), Some((3, 1.25)), None]);
+    }
+}

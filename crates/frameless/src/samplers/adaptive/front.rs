@@ -8,8 +8,10 @@ use crate::{Canvas, Observation, Size, Time, wide};
 const FRONT_CHANGE: f32 = 0.0025;
 /// Neighbours traced later than a time before the front was found are left alone; its bounds.
 const FRESH_NANOS: [f32; 2] = [1e6, 12e6];
-/// How fast that adapts, per batch.
-const ADAPT: f32 = 1.03;
+/// How fast that adapts: this part of itself per second.
+const ADAPT_PER_SEC: f64 = 29.0;
+/// The most by which it is multiplied or divided at once, however long a batch takes.
+const MOST_AT_ONCE: f64 = 2.0;
 
 /// How many pixels ahead of the one looked at the next is fetched.
 const AHEAD: usize = 8;
@@ -21,6 +23,8 @@ pub(crate) struct Front {
     capacity: usize,
     /// Neighbours younger than this are left alone.
     fresh_nanos: f32,
+    /// When that was adapted last.
+    adapted: Time,
     // Of the observations at hand.
     changed: Vec<Observation>,
     stale: Vec<u32>,
@@ -90,13 +94,16 @@ impl Front {
             changed,
             stale,
             fresh_nanos: FRESH_NANOS[1],
+            adapted: Time::ZERO,
         }
     }
 
     /// After a batch: where all fronts have been followed and samples are left, younger neighbours are looked at again as well; where
     /// fronts have to wait, only older ones.
-    pub(crate) fn adapt(&mut self, all_followed: bool) {
-        let factor = if all_followed { 1.0 / ADAPT } else { ADAPT };
+    pub(crate) fn adapt(&mut self, now: Time, all_followed: bool) {
+        let secs = now.secs_since(std::mem::replace(&mut self.adapted, now));
+        let growth = (1.0 + ADAPT_PER_SEC * secs).min(MOST_AT_ONCE) as f32;
+        let factor = if all_followed { 1.0 / growth } else { growth };
         self.fresh_nanos = (self.fresh_nanos * factor).clamp(FRESH_NANOS[0], FRESH_NANOS[1]);
     }
 
@@ -150,6 +157,12 @@ impl Front {
             self.queued.set(observed.pixel, true);
             self.queue.push_back((observed.pixel, Time(u64::MAX)));
         }
+    }
+
+    /// Of how many nanoseconds neighbours are left alone now.
+    #[cfg(test)]
+    pub(crate) fn fresh_nanos(&self) -> f32 {
+        self.fresh_nanos
     }
 
     /// The next pixel that has not been traced since it was queued.
@@ -246,9 +259,10 @@ mod tests {
             std::iter::from_fn(|| front.next(&canvas)).count()
         };
         assert_eq!(next(&mut front), 0, "5 ms are young at first");
-        (0..100).for_each(|_| front.adapt(true));
+        let millis = |millis: u64| Time(millis * 1_000_000);
+        (1..101).for_each(|time| front.adapt(millis(time), true));
         assert_eq!(next(&mut front), 2);
-        (0..100).for_each(|_| front.adapt(false));
+        (101..201).for_each(|time| front.adapt(millis(time), false));
         assert_eq!(next(&mut front), 0, "and again where fronts have to wait");
     }
 }

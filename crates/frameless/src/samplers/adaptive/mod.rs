@@ -179,6 +179,7 @@ impl State {
 
     fn choose_fronts(
         &mut self,
+        now: Time,
         canvas: &Canvas,
         rest: usize,
         temporal: f32,
@@ -193,12 +194,12 @@ impl State {
         }
         let end = requests.len() + (self.front_share * rest as f32) as usize;
         while requests.len() < end {
-            let Some(pixel) = self.front.next(canvas) else { return self.front.adapt(true) };
+            let Some(pixel) = self.front.next(canvas) else { return self.front.adapt(now, true) };
             if self.weights.lets_pass(&self.rates.grid, pixel) {
                 self.take(pixel, Why::Front, requests);
             }
         }
-        self.front.adapt(false);
+        self.front.adapt(now, false);
     }
 
     fn choose_late(
@@ -280,7 +281,7 @@ impl Sampler for Adaptive {
         }
         if without != Some(AdaptiveStage::Fronts) {
             let rest = count - (requests.len() - start);
-            state.choose_fronts(canvas, rest, self.temporal, requests);
+            state.choose_fronts(now, canvas, rest, self.temporal, requests);
         }
         if without != Some(AdaptiveStage::Late) {
             let rest = count - (requests.len() - start);
@@ -515,5 +516,58 @@ mod tests {
         let pixels = choose(&mut sampler, &canvas, 128);
         assert!(pixels[..64].iter().all(is_right), "those that count");
         assert!(!pixels[64..].iter().any(is_right), "then all others");
+    }
+
+    /// Plays 400 ms with 100 samples each; of pixels for which `is_restless` says so every sample differs by `change`.
+    fn play(sampler: &mut Adaptive, is_restless: fn(u32) -> bool, change: f32) {
+        let size = Size::new(64, 64);
+        let mut canvas = Canvas::from_picture(size, vec![[0.0; 3]; size.pixels()]);
+        for turn in 1..400u64 {
+            let now = Time(turn * 1_000_000);
+            let mut requests = Vec::new();
+            sampler.choose(now, &canvas, 100, &mut requests);
+            let observe = |&Request { pixel, .. }: &Request| {
+                let (previous, _) = canvas.replace(pixel, now, [0.0; 3]);
+                let change = if is_restless(pixel) { change } else { 0.0 };
+                Observation { pixel, now, previous, known: true, change, refinement: None }
+            };
+            let observations: Vec<Observation> = requests.iter().map(observe).collect();
+            sampler.observe(&canvas, &observations);
+        }
+    }
+
+    #[test]
+    fn fronts_look_again_sooner_where_samples_are_left_and_end_where_everything_changes() {
+        let mut sampler = Adaptive::new(DEFAULT_TEMPORAL, 1);
+        play(&mut sampler, |pixel| pixel == 2080, 0.5);
+        let state = sampler.state.as_ref().expect("chosen");
+        assert!(state.front.fresh_nanos() < 2e6, "{}", state.front.fresh_nanos());
+        assert_eq!(state.front_share, FRONT_SHARE);
+        let mut sampler = Adaptive::new(DEFAULT_TEMPORAL, 1);
+        play(&mut sampler, |_| true, 0.5);
+        assert_eq!(sampler.state.as_ref().expect("chosen").front_share, 0.0);
+    }
+
+    #[test]
+    fn late_looks_obey_the_control() {
+        let size = Size::new(64, 64);
+        let late = |temporal: f32| {
+            let mut canvas = Canvas::from_picture(size, vec![[0.0; 3]; size.pixels()]);
+            let mut sampler = Adaptive::new(temporal, 1);
+            let mut requests = Vec::new();
+            for millis in 0..48u64 {
+                let now = Time(millis * 1_000_000);
+                if millis % 16 == 0 {
+                    let (mut time, mut known) = (canvas.time().to_vec(), canvas.known().to_vec());
+                    canvas.update(now, &mut Vec::new(), &mut time, &mut known);
+                    canvas.set_last_minute(&mut (0..200).collect());
+                }
+                sampler.choose(now, &canvas, 100, &mut requests);
+            }
+            let why = &sampler.state.as_ref().expect("chosen").why;
+            (0..200).filter(|&pixel| why.of(pixel) == Why::Late).count()
+        };
+        assert!(late(DEFAULT_TEMPORAL) > 150, "{}", late(DEFAULT_TEMPORAL));
+        assert_eq!(late(0.0), 0);
     }
 }

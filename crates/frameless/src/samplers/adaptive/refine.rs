@@ -226,3 +226,21 @@ impl Refine {
         None
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Size;
+
+    #[test]
+    fn a_part_of_the_samples_always_looks_for_change() {
+        let grid = TileGrid::new(Size::new(16, 16), 8);
+        let mut refine = Refine::new(&grid, 3, &mut Rng::new(1));
+        assert_eq!(refine.temporal_part(0.0), 1.0, "nothing to refine");
+        (refine.spatial_error, refine.temporal_error) = (1.0, 1e-9);
+        assert_eq!(refine.temporal_part(0.5), LEAST_TEMPORAL);
+        assert_eq!(refine.temporal_part(0.0), LEAST_TEMPORAL);
+        refine.temporal_error = 1.0;
+        assert_eq!(refine.temporal_part(0.5), 0.5);
+    }
+}
