@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, Parser, Subcommand};
 use frameless::{ReconstructionKind, Size};
 
+use crate::failure::Failure;
 use crate::parse;
 
 const LONG_ABOUT: &str = "\
@@ -304,9 +305,9 @@ pub(crate) struct BenchArgs {
     #[arg(value_enum)]
     pub(crate) what: Benchmark,
 
-    /// A glTF file or a built-in scene
-    #[arg(long, default_value = DEFAULT_SCENE)]
-    pub(crate) scene: String,
+    /// A glTF file or a built-in scene [default: sphere; `display` has scenes of its own]
+    #[arg(long)]
+    scene: Option<String>,
 
     /// Size of the picture in pixels
     #[arg(long, value_name = "WxH", default_value = "512x384", value_parser = parse::size)]
@@ -327,6 +328,26 @@ pub(crate) struct BenchArgs {
     /// Print one JSON object, {"rows": [{name, value, min, max, unit, conditions}]}
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+impl BenchArgs {
+    /// What is traced.
+    pub(crate) fn scene(&self) -> &str {
+        self.scene.as_deref().unwrap_or(DEFAULT_SCENE)
+    }
+
+    /// For benchmarks whose scenes are fixed.
+    ///
+    /// # Errors
+    /// If another is asked for.
+    pub(crate) fn no_scene(&self) -> Result<(), Failure> {
+        match &self.scene {
+            Some(scene) => Err(Failure::bad_input(anyhow::anyhow!(
+                "--scene {scene}: this benchmark has scenes of its own; leave --scene out"
+            ))),
+            None => Ok(()),
+        }
+    }
 }
 
 /// The benchmarks.

@@ -31,6 +31,7 @@ const CASES: [Case; 3] = [
 /// Rows `display.reproject_gather_ns_per_px.<what moves>`: nanoseconds per pixel of `Engine::refresh` (warp, gather, holes), each
 /// round's median over its refreshes.
 pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
+    args.no_scene()?;
     let conditions = format!(
         "{}×{}, adaptive+reproject, simulated clock at {RATE} samples/s, {REFRESHES_PER_SEC} refreshes/s, one thread; \
          {} rounds of {} s; orbit, sphere, and sphere standing still",

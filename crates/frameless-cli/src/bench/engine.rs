@@ -15,7 +15,7 @@ const WARM_UP_SECS: f64 = 0.2;
 
 /// Rows `engine.<sampler>_samples_per_sec` and `engine.<sampler>_over_random`, the ratio round by round.
 pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
-    let world = Arc::new(World::new(Arc::new(input::scene(&args.scene)?)));
+    let world = Arc::new(World::new(Arc::new(input::scene(args.scene())?)));
     let mut rates = SamplerKind::ALL.map(|_| Vec::new());
     for round in 0..args.rounds {
         // Everybody is first as often as last: the machine's speed drifts within a round too.
@@ -27,7 +27,7 @@ pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
     }
     let conditions = format!(
         "{}, {}×{}, real clock, {} threads, {} alternating rounds of {} s; surfaces are not asked for",
-        args.scene,
+        args.scene(),
         args.size.width,
         args.size.height,
         threads(args),

@@ -165,8 +165,18 @@ impl Reconstruction for Reproject {
     }
 
     fn refresh(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas, picture: &mut Vec<[f32; 3]>) {
-        let size = canvas.size();
-        self.fit(size);
+        self.fit(canvas.size());
+        self.carry(refresh);
+        self.light(refresh);
+        self.show(refresh, canvas, picture);
+        self.tell(refresh, canvas);
+    }
+}
+
+/// The steps of a refresh, in their order.
+impl Reproject {
+    /// Every sample to where its surface is now.
+    fn carry(&mut self, refresh: &Refresh<'_>) {
         self.poses.swap(0, 1);
         match refresh.pose {
             Some(pose) => self.poses[0].clone_from(pose),
@@ -175,22 +185,26 @@ impl Reconstruction for Reproject {
         self.interval_secs = refresh.now.secs_since(self.shown_at) as f32;
         self.refreshes += 1;
         self.shown_at = refresh.now;
-        let at_rest = self.refreshes >= 2 && self.poses[0] == self.poses[1];
         // Nothing is known to move before the second refresh.
         let before = &self.poses[usize::from(self.refreshes >= 2)];
         self.settled.find_moved([&self.poses[0], before]);
         if refresh.is_noisy {
             self.settled.hand_over(&mut self.store, refresh.display);
         }
-        if !at_rest {
-            // Of what was kept before the first refresh nobody knows yet where it is.
-            let (first, settled) = (self.refreshes < 2, &self.settled);
-            let rests = |object| object == store::SCREEN || !first && settled.rests(object);
-            self.warp.run(&mut self.store, &self.poses[0], rests);
-            if self.options.without != Some(ReprojectStage::Cracks) {
-                self.warp.remove_seen_through_cracks(&mut self.store);
-            }
+        if self.refreshes >= 2 && self.poses[0] == self.poses[1] {
+            return;
         }
+        // Of what was kept before the first refresh nobody knows yet where it is.
+        let (first, settled) = (self.refreshes < 2, &self.settled);
+        let rests = |object| object == store::SCREEN || !first && settled.rests(object);
+        self.warp.run(&mut self.store, &self.poses[0], rests);
+        if self.options.without != Some(ReprojectStage::Cracks) {
+            self.warp.remove_seen_through_cracks(&mut self.store);
+        }
+    }
+
+    /// Their colours for the present display and lights.
+    fn light(&mut self, refresh: &Refresh<'_>) {
         let display = *refresh.display;
         if std::mem::replace(&mut self.display, display) != display {
             let (store, relight) = (&mut self.store, &self.relight);
@@ -200,6 +214,11 @@ impl Reconstruction for Reproject {
         if let Some(lighting) = refresh.lighting {
             self.relight.run(&mut self.store, lighting, &display);
         }
+    }
+
+    /// The picture, and what waits to be traced.
+    fn show(&mut self, refresh: &Refresh<'_>, canvas: &Canvas, picture: &mut Vec<[f32; 3]>) {
+        let size = canvas.size();
         let rates = refresh.rates.unwrap_or_else(|| {
             self.no_rates.get_or_insert_with(|| Rates::new(TileGrid::new(size, 8)))
         });
@@ -208,25 +227,33 @@ impl Reconstruction for Reproject {
         }
         tile_contrast(&self.shown, &rates.grid, &mut self.contrast);
         self.gather.run(&self.store, refresh.now, rates, &self.contrast, &self.shown, picture);
-        self.relight.find_shadow_edges(&self.store, &mut self.edges);
-        canvas.set_last_minute(&mut self.edges);
         let recentres = self.options.without != Some(ReprojectStage::Recentre);
         if recentres && self.settled.any_rests() {
             self.gather.find_off_centre(&self.store, |object| self.settled.rests(object));
         }
-        let wanted = match refresh.is_noisy {
-            true => settle::MOST_SAMPLES,
-            false if self.options.antialias => settle::SAMPLES_WITHOUT_NOISE,
-            false => 0,
-        };
-        if wanted > 0 {
+        if self.samples_wanted(refresh) > 0 {
             self.settled.show(&mut self.store, &self.relight, refresh, picture);
         }
         self.shown.clone_from(picture);
+    }
+
+    /// Of how many samples pixels at rest are to show the mean; 0: none.
+    fn samples_wanted(&self, refresh: &Refresh<'_>) -> u16 {
+        match refresh.is_noisy {
+            true => settle::MOST_SAMPLES,
+            false if self.options.antialias => settle::SAMPLES_WITHOUT_NOISE,
+            false => 0,
+        }
+    }
+
+    /// Tells the canvas what its pixels show now.
+    fn tell(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas) {
+        self.relight.find_shadow_edges(&self.store, &mut self.edges);
+        canvas.set_last_minute(&mut self.edges);
         let gather::Gather { waiting, time, known, .. } = &mut self.gather;
         waiting.order(&mut self.holes);
         canvas.update(refresh.now, &mut self.holes, time, known);
-        canvas.set_samples(wanted, self.settled.counts());
+        canvas.set_samples(self.samples_wanted(refresh), self.settled.counts());
         let grid = refresh.rates.filter(|_| refresh.wants_motion).map(|rates| &rates.grid);
         let motion = grid.into_iter().flat_map(|grid| self.tile_motion(grid));
         canvas.set_tiles(&self.contrast, motion);
