@@ -81,6 +81,7 @@ impl Reproject {
     fn fit(&mut self, size: Size) {
         if self.store.layout.size != size {
             self.store = Store::new(size, self.cells);
+            self.warp = Default::default();
             self.refreshes = 0;
             self.shown.clear();
             self.settled.fit(size);
@@ -99,6 +100,15 @@ impl Reproject {
         self.settled.prefetch(pixel);
         for y in y.saturating_sub(1)..(y + 2).min(height) {
             wide::prefetch(&self.shown, (y * width + x) as usize);
+        }
+    }
+
+    /// Whoever is in a new sample's cell and moves will be somewhere else at the next refresh.
+    fn make_room(&mut self, sample: &store::Sample) {
+        let is_moving = |&cell: &usize| !self.settled.rests(self.store.object[cell]);
+        let cell = self.store.layout.of_px(sample.px).filter(is_moving);
+        if let Some(cell) = cell.filter(|_| self.refreshes >= 2) {
+            self.warp.displace(&mut self.store, cell);
         }
     }
 
@@ -142,6 +152,7 @@ impl Reconstruction for Reproject {
             let mut sample = store::Sample::new(kept, i, display);
             let found = self.residual(&sample, kept, i, display);
             sample.depth = found.depth;
+            self.make_room(&sample);
             self.store.insert(&sample, found.outdated);
             findings.changes.push(found.change);
         }
@@ -191,7 +202,8 @@ impl Reproject {
         if refresh.is_noisy {
             self.settled.hand_over(&mut self.store, refresh.display);
         }
-        if self.refreshes >= 2 && self.poses[0] == self.poses[1] {
+        let at_rest = self.refreshes >= 2 && self.poses[0] == self.poses[1];
+        if at_rest && !self.warp.has_displaced() {
             return;
         }
         // Of what was kept before the first refresh nobody knows yet where it is.

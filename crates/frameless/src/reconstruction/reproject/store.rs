@@ -5,7 +5,7 @@
 //! need no bounds.
 //!
 //! What shading a sample again takes is needed only now and then, and lies in a slot. When the sample moves to another cell its slot
-//! stays where it is. There are as many slots as cells, and every cell has one, also while it is empty.
+//! stays where it is. Every cell has one, also while it is empty.
 
 use super::packed::{PackedAlbedo, PackedNormal};
 use crate::wide::{self, F8, M8, Unit};
@@ -202,6 +202,8 @@ pub(super) struct Store {
     pub(super) slot: Vec<u32>,
     /// Per slot.
     pub(super) shade: Vec<Shade>,
+    /// Slots that no cell has.
+    pub(super) spare: Vec<u32>,
 }
 
 impl Store {
@@ -217,6 +219,7 @@ impl Store {
             anchor: vec![Anchor::default(); layout.len()],
             slot: (0..layout.len() as u32).collect(),
             shade: vec![Shade::default(); layout.len()],
+            spare: Vec::new(),
             layout,
         }
     }
@@ -321,6 +324,14 @@ impl Store {
             !self.is_empty(i) && dx * dx + dy * dy < CENTRAL_PX * CENTRAL_PX
         };
         self.of_pixel(x, y).find(is_central)
+    }
+
+    /// A slot that no cell has.
+    pub(super) fn new_slot(&mut self) -> u32 {
+        self.spare.pop().unwrap_or_else(|| {
+            self.shade.push(Shade::default());
+            self.shade.len() as u32 - 1
+        })
     }
 
     /// Puts a sample into its cell. `outdated`: the pixel's others show something that is no longer there.

@@ -1,6 +1,7 @@
 //! The forward step: every sample whose object moves goes to where its surface is now.
 //!
-//! The samples that move are lifted out of their cells, and put down again where they are now; all others stay where they are.
+//! The samples that move are lifted out of their cells, and put down again where they are now; all others stay where they are. So it is
+//! with samples that move and whose cells have been taken by new ones since the last refresh.
 //! Where two samples meet in a cell, the nearer one stays if it is nearer by 1.5 %. On the same surface the newer one stays, and
 //! the other moves to the neighbouring cell on its side, if that is empty; so it is with samples whose surface is not known. At
 //! last what is seen through the cracks between a nearer object's samples is taken away.
@@ -33,6 +34,8 @@ pub(super) struct Warp {
     /// Samples that came to a row that had not been lifted.
     early: Vec<(u32, Mover)>,
     losers: Vec<Mover>,
+    /// Samples that move, and whose cells others have taken since the last refresh.
+    displaced: Vec<Mover>,
     /// First cells of eights of which some have been lifted.
     starts: Vec<u32>,
     /// Slots of samples that are gone.
@@ -104,9 +107,38 @@ impl Warp {
     /// `rests`: of an object number, whether its samples stay where they are.
     pub(super) fn run(&mut self, store: &mut Store, pose: &Pose, rests: impl Fn(u32) -> bool) {
         wide::run(Carry { warp: self, store, pose, rests });
+        self.carry_displaced(store, pose);
         self.put_down_early(store);
         self.step_aside(store);
         self.give_back_slots(store);
+    }
+
+    /// Takes the sample in a cell away until the next refresh: it moves, and somebody else is there now. Beyond as many as there are
+    /// cells, while nobody asks for a picture, samples are lost.
+    pub(super) fn displace(&mut self, store: &mut Store, cell: usize) {
+        if self.displaced.len() >= store.layout.len() {
+            return;
+        }
+        self.displaced.push(take(store, cell));
+        store.slot[cell] = store.new_slot();
+    }
+
+    pub(super) fn has_displaced(&self) -> bool {
+        !self.displaced.is_empty()
+    }
+
+    fn carry_displaced(&mut self, store: &mut Store, pose: &Pose) {
+        let Warp { displaced, early, free, .. } = self;
+        for mut mover in displaced.drain(..) {
+            let there = pose.project(&mover.anchor.on(mover.object));
+            match there.and_then(|there| Some((there, store.layout.of_px(there.px)?))) {
+                Some((there, cell)) => {
+                    (mover.px, mover.depth) = (there.px, there.depth);
+                    early.push((cell as u32, mover));
+                }
+                None => free.push(mover.slot),
+            }
+        }
     }
 
     fn put_down_early(&mut self, store: &mut Store) {
@@ -143,7 +175,7 @@ impl Warp {
                 }
             }
         }
-        debug_assert!(self.free.is_empty());
+        store.spare.append(&mut self.free);
     }
 
     /// After [`Warp::run`]: what is seen between a nearer object's samples.
@@ -520,6 +552,39 @@ mod tests {
         let cell = |x| store.layout.of_pixel(x, 0);
         let sample = |x| (store.tick[cell(x)], store.px[0][cell(x)]);
         (0..8).map(|x| (!store.is_empty(cell(x))).then(|| sample(x))).collect()
+    }
+
+    #[test]
+    fn who_is_displaced_comes_back_where_its_surface_is() {
+        let mut store = Store::new(Size::new(8, 1), 1);
+        let cell = |store: &Store, x: f32| store.layout.of_px([x, 0.5]).expect("inside");
+        let (old, gone) = (cell(&store, 1.5), cell(&store, 7.5));
+        for (i, x) in [(old, 1.5), (gone, 7.5)] {
+            store.object[i] = 0;
+            store.anchor[i] = Anchor([x, 0.5, 0.0, 0.0]);
+            store.shade[store.slot[i] as usize].lit = 7;
+        }
+        let mut warp = Warp::default();
+        for i in [old, gone] {
+            warp.displace(&mut store, i);
+            // Something at rest has been traced there.
+            store.object[i] = SCREEN;
+        }
+        // Three to the right: one of the two leaves the picture.
+        let moved = Projection([
+            [1.0, 0.0, 0.0, 3.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ]);
+        let pose = Pose { picture_from_object: vec![moved], ..Pose::default() };
+        warp.run(&mut store, &pose, |object| object == SCREEN);
+        let now = cell(&store, 4.5);
+        assert_eq!((store.object[now], store.px[0][now], store.shade(now).lit), (0, 4.5, 7));
+        assert_eq!((store.object[old], store.object[gone]), (SCREEN, SCREEN));
+        let mut slots: Vec<u32> = store.slot.iter().chain(&store.spare).copied().collect();
+        slots.sort_unstable();
+        assert!(slots.iter().copied().eq(0..store.shade.len() as u32), "nobody shares a slot");
     }
 
     #[test]
