@@ -6,6 +6,7 @@
 //! land on pixel centres at the next refresh ([`aim`]).
 
 mod aim;
+mod cracks;
 mod fill;
 mod gather;
 mod holes;
@@ -50,6 +51,7 @@ pub struct Reproject {
     contrast: Vec<f32>,
     holes: Vec<u32>,
     edges: Vec<u32>,
+    covered: Vec<u32>,
     no_rates: Option<Rates>,
 }
 
@@ -74,6 +76,7 @@ impl Reproject {
             contrast: Vec::new(),
             holes: Vec::new(),
             edges: Vec::new(),
+            covered: Vec::new(),
             no_rates: None,
         }
     }
@@ -211,7 +214,7 @@ impl Reproject {
         let rests = |object| object == store::SCREEN || !first && settled.rests(object);
         self.warp.run(&mut self.store, &self.poses[0], rests);
         if self.options.without != Some(ReprojectStage::Cracks) {
-            self.warp.remove_seen_through_cracks(&mut self.store);
+            cracks::remove(&mut self.store, &mut self.covered);
         }
     }
 

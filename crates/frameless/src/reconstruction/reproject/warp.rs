@@ -3,8 +3,7 @@
 //! The samples that move are lifted out of their cells, and put down again where they are now; all others stay where they are. So it is
 //! with samples that move and whose cells have been taken by new ones since the last refresh.
 //! Where two samples meet in a cell, the nearer one stays if it is nearer by 1.5 %. On the same surface the newer one stays, and
-//! the other moves to the neighbouring cell on its side, if that is empty; so it is with samples whose surface is not known. At
-//! last what is seen through the cracks between a nearer object's samples is taken away.
+//! the other moves to the neighbouring cell on its side, if that is empty; so it is with samples whose surface is not known.
 
 use super::store::{Anchor, EMPTY, Layout, SCREEN, Store};
 use crate::wide::{self, F8, M8, Unit};
@@ -12,8 +11,6 @@ use crate::{Pose, Surface};
 
 /// Depths within this ratio belong to the same surface.
 const SAME_SURFACE: f32 = 0.015;
-/// A neighbour nearer by more than this ratio covers what is behind it.
-const COVERS: f32 = 0.07;
 
 /// The first cell lies in the border, so that no sample is ever there.
 const NOWHERE: u32 = 0;
@@ -40,7 +37,6 @@ pub(super) struct Warp {
     starts: Vec<u32>,
     /// Slots of samples that are gone.
     free: Vec<u32>,
-    covered: Vec<u32>,
 }
 
 #[derive(Default)]
@@ -176,15 +172,6 @@ impl Warp {
             }
         }
         store.spare.append(&mut self.free);
-    }
-
-    /// After [`Warp::run`]: what is seen between a nearer object's samples.
-    pub(super) fn remove_seen_through_cracks(&mut self, store: &mut Store) {
-        self.covered.clear();
-        wide::run(Cracks { store, covered: &mut self.covered });
-        for &i in &self.covered {
-            store.object[i as usize] = EMPTY;
-        }
     }
 }
 
@@ -430,100 +417,27 @@ fn put(store: &mut Store, cell: usize, mover: &Mover, free: &mut Vec<u32>) {
     }
 }
 
-struct Cracks<'a> {
-    store: &'a Store,
-    covered: &'a mut Vec<u32>,
-}
-
-impl wide::Task for Cracks<'_> {
-    #[inline(always)]
-    fn run<U: Unit>(self) {
-        let Cracks { store, covered } = self;
-        let layout = &store.layout;
-        let (n, size) = (layout.per_side as i32, layout.size);
-        for sub in 0..n * n {
-            let around = Around::new(layout, sub);
-            for y in 1..size.height as i32 - 1 {
-                for x in (1..size.width as i32 - 1).step_by(8) {
-                    let first = layout.of_pixel(x, y) + sub as usize * layout.plane;
-                    let inside = M8::<U>::first_lanes((size.width as i32 - 1 - x) as usize);
-                    let mask = are_covered(store, first, &around).and(inside);
-                    mask.for_each(|lane| covered.push((first + lane) as u32));
-                }
-            }
-        }
-    }
-}
-
-/// From a cell to those within a pixel's distance.
-struct Around {
-    offsets: [isize; 24],
-    len: usize,
-    /// How many may be there that do not cover.
-    others: u32,
-}
-
-impl Around {
-    fn new(layout: &Layout, sub: i32) -> Around {
-        let n = layout.per_side as i32;
-        let (sx, sy) = (sub % n, sub / n);
-        let here = layout.neighbour(1, 1, sx, sy) as isize;
-        let (mut offsets, mut len) = ([0; 24], 0);
-        for dy in -n..=n {
-            for dx in -n..=n {
-                if (dx, dy) != (0, 0) {
-                    offsets[len] = layout.neighbour(1, 1, sx + dx, sy + dy) as isize - here;
-                    len += 1;
-                }
-            }
-        }
-        Around { offsets, len, others: 1 + 2 * (n as u32 - 1) }
-    }
-}
-
-/// Whether at least six of the eight samples around are of nearer, other objects, and at most one is not.
-#[inline(always)]
-fn are_covered<U: Unit>(store: &Store, first: usize, around: &Around) -> M8<U> {
-    let objects = M8::load(&store.object, first);
-    let empty = M8::splat(EMPTY);
-    let left = M8::load(&store.object, first - 1).equals(objects);
-    let alike = left.and(M8::load(&store.object, first + 1).equals(objects));
-    let candidates = alike.not().and(objects.equals(empty).not());
-    let none = M8::splat(0);
-    if !candidates.any() {
-        return none;
-    }
-    let offsets = &around.offsets[..around.len];
-    // Masks are −1 where they are set: counts are kept negative.
-    let mut foreign = none;
-    for &offset in offsets {
-        let others = M8::load(&store.object, first.wrapping_add_signed(offset));
-        foreign = foreign.plus(others.equals(objects).not().and(others.equals(empty).not()));
-    }
-    let candidates = candidates.and(foreign.less_than(M8::splat(-5i32 as u32)));
-    if !candidates.any() {
-        return none;
-    }
-    let limit = F8::load(&store.depth, first) * F8::splat(1.0 - COVERS);
-    let (mut nearer, mut samples) = (none, none);
-    for &offset in offsets {
-        let j = first.wrapping_add_signed(offset);
-        let others = M8::load(&store.object, j);
-        let is_sample = others.equals(empty).not();
-        let covers = F8::load(&store.depth, j).less_than(limit);
-        samples = samples.plus(is_sample);
-        nearer = nearer.plus(is_sample.and(covers).and(others.equals(objects).not()));
-    }
-    // nearer + others ≥ samples.
-    let enough = samples.plus(M8::splat(around.others)).less_than(nearer).not();
-    let all_but_few = nearer.less_than(M8::splat(-5i32 as u32)).and(enough);
-    candidates.and(all_but_few)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{Projection, Size};
+
+    /// Takes x of object 0 to column `scale` · x + `shift`.
+    fn pose(scale: f32, shift: f32) -> Pose {
+        let projection = Projection([
+            [scale, 0.0, 0.0, shift],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ]);
+        Pose { picture_from_object: vec![projection], ..Pose::default() }
+    }
+
+    fn assert_nobody_shares_a_slot(store: &Store) {
+        let mut slots: Vec<u32> = store.slot.iter().chain(&store.spare).copied().collect();
+        slots.sort_unstable();
+        assert!(slots.into_iter().eq(0..store.shade.len() as u32));
+    }
 
     /// Samples of object 0 at positions x of a row of eight pixels, each newer than the one before, where a pose that makes everything
     /// half as wide takes them.
@@ -535,20 +449,8 @@ mod tests {
             store.tick[cell] = tick;
             store.anchor[cell] = Anchor([x, 0.5, 0.0, 0.0]);
         }
-        let half = Projection([
-            [0.5, 0.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0, 0.0],
-            [0.0, 0.0, 0.0, 1.0],
-            [0.0, 0.0, 0.0, 1.0],
-        ]);
-        let pose = Pose { picture_from_object: vec![half], ..Pose::default() };
-        Warp::default().run(&mut store, &pose, |_| false);
-        let mut slots = store.slot.clone();
-        slots.sort_unstable();
-        assert!(
-            slots.iter().copied().eq(0..slots.len() as u32),
-            "every cell has a slot of its own"
-        );
+        Warp::default().run(&mut store, &pose(0.5, 0.0), |_| false);
+        assert_nobody_shares_a_slot(&store);
         let cell = |x| store.layout.of_pixel(x, 0);
         let sample = |x| (store.tick[cell(x)], store.px[0][cell(x)]);
         (0..8).map(|x| (!store.is_empty(cell(x))).then(|| sample(x))).collect()
@@ -571,20 +473,11 @@ mod tests {
             store.object[i] = SCREEN;
         }
         // Three to the right: one of the two leaves the picture.
-        let moved = Projection([
-            [1.0, 0.0, 0.0, 3.0],
-            [0.0, 1.0, 0.0, 0.0],
-            [0.0, 0.0, 0.0, 1.0],
-            [0.0, 0.0, 0.0, 1.0],
-        ]);
-        let pose = Pose { picture_from_object: vec![moved], ..Pose::default() };
-        warp.run(&mut store, &pose, |object| object == SCREEN);
+        warp.run(&mut store, &pose(1.0, 3.0), |object| object == SCREEN);
         let now = cell(&store, 4.5);
         assert_eq!((store.object[now], store.px[0][now], store.shade(now).lit), (0, 4.5, 7));
         assert_eq!((store.object[old], store.object[gone]), (SCREEN, SCREEN));
-        let mut slots: Vec<u32> = store.slot.iter().chain(&store.spare).copied().collect();
-        slots.sort_unstable();
-        assert!(slots.iter().copied().eq(0..store.shade.len() as u32), "nobody shares a slot");
+        assert_nobody_shares_a_slot(&store);
     }
 
     #[test]
