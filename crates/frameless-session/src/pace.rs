@@ -7,15 +7,9 @@
 
 use frameless::Time;
 
-/// What a software driver spends on a window of so many pixels, in seconds of all its threads: the toolkit's clock does
-/// not see them. Measured with lavapipe: 19 ms for 1280 × 800, panel and picture shown.
-pub(crate) fn software_paint_secs(window_px: f64) -> f64 {
-    19e-9 * window_px
-}
-
 /// Says when the next picture is due.
 #[derive(Clone, Debug)]
-pub(crate) struct Pace {
+pub struct Pace {
     due: Time,
     paint_secs: f64,
 }
@@ -35,12 +29,12 @@ const LEARNING_RATE: f64 = 0.1;
 
 impl Pace {
     /// Due at once.
-    pub(crate) fn new() -> Pace {
+    pub fn new() -> Pace {
         Pace { due: Time::ZERO, paint_secs: 0.0 }
     }
 
     /// Told what the window's last paint cost, in seconds without waiting for the display.
-    pub(crate) fn painted(&mut self, paint_secs: f64) {
+    pub fn painted(&mut self, paint_secs: f64) {
         if paint_secs.is_finite() {
             self.paint_secs += LEARNING_RATE * (paint_secs - self.paint_secs);
         }
@@ -48,14 +42,14 @@ impl Pace {
 
     /// Told when a picture is ready, and what making it cost in seconds of the render loop. The samples get their share before
     /// the next one: at once and not on average, since the first pictures of a large window cost most.
-    pub(crate) fn made(&mut self, now: Time, refresh_secs: f64) {
+    pub fn made(&mut self, now: Time, refresh_secs: f64) {
         let rest_secs = refresh_secs * (1.0 / REFRESH_SHARE - 1.0);
         let rested = Time::from_secs(now.secs() + rest_secs.min(LONGEST_REST_SECS));
         self.due = self.due.max(rested);
     }
 
     /// Whether a picture is due; if so, the next one is due an interval later.
-    pub(crate) fn is_due(&mut self, now: Time) -> bool {
+    pub fn is_due(&mut self, now: Time) -> bool {
         if now < self.due {
             return false;
         }
@@ -65,7 +59,7 @@ impl Pace {
     }
 
     /// Seconds between two pictures, as far as painting goes.
-    pub(crate) fn interval_secs(&self) -> f64 {
+    pub fn interval_secs(&self) -> f64 {
         (self.paint_secs / PAINT_SHARE).clamp(SHORTEST_SECS, LONGEST_SECS)
     }
 }
