@@ -7,8 +7,8 @@
 
 use frameless::Time;
 
-/// Says when the next picture is due.
-#[derive(Clone, Debug)]
+/// Says when the next picture is due; the first one at once.
+#[derive(Clone, Debug, Default)]
 pub struct Pace {
     due: Time,
     paint_secs: f64,
@@ -28,11 +28,6 @@ const LONGEST_REST_SECS: f64 = 1.0;
 const LEARNING_RATE: f64 = 0.1;
 
 impl Pace {
-    /// Due at once.
-    pub fn new() -> Pace {
-        Pace { due: Time::ZERO, paint_secs: 0.0 }
-    }
-
     /// Told what the window's last paint cost, in seconds without waiting for the display.
     pub fn painted(&mut self, paint_secs: f64) {
         if paint_secs.is_finite() {
@@ -74,14 +69,14 @@ mod tests {
 
     #[test]
     fn cheap_painting_goes_at_the_displays_rate() {
-        let mut pace = Pace::new();
+        let mut pace = Pace::default();
         pace.painted(0.001);
         assert!((60..=67).contains(&due_in_a_second(&mut pace)));
     }
 
     #[test]
     fn dear_painting_goes_at_a_quarter_of_a_core() {
-        let mut pace = Pace::new();
+        let mut pace = Pace::default();
         (0..100).for_each(|_| pace.painted(0.01));
         let painted = due_in_a_second(&mut pace);
         assert!((24..=26).contains(&painted), "{painted} × 10 ms");
@@ -94,7 +89,7 @@ mod tests {
     #[test]
     fn dear_refreshes_leave_the_samples_two_thirds_of_the_loop() {
         let made_in_a_second = |refresh_ms: u64| {
-            let (mut pace, mut now, mut made) = (Pace::new(), Time::from_secs(1.0), 0);
+            let (mut pace, mut now, mut made) = (Pace::default(), Time::from_secs(1.0), 0);
             while now < Time::from_secs(2.0) {
                 now.0 += 1_000_000;
                 if pace.is_due(now) {
@@ -109,7 +104,7 @@ mod tests {
         assert!((11..=12).contains(&made_in_a_second(30)));
         // The very first already.
         assert_eq!(made_in_a_second(300), 2);
-        let mut pace = Pace::new();
+        let mut pace = Pace::default();
         pace.made(Time::ZERO, 60.0);
         assert!(pace.is_due(Time::from_secs(LONGEST_REST_SECS)));
     }

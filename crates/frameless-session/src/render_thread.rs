@@ -78,7 +78,7 @@ fn run<S: Stage>(
     reports: &Sender<Report>,
     wake: impl Fn(),
 ) {
-    let mut pace = Pace::new();
+    let mut pace = Pace::default();
     let mut wanted = None;
     let mut next_error = Time::ZERO;
     // Sending fails once the window is gone; then the channel of commands is closed, too.
