@@ -7,6 +7,7 @@ use frameless_scene::{Geometry, Mesh, Scene};
 use rayon::prelude::*;
 
 use crate::build::Blas;
+use crate::emitters::Emitters;
 use crate::images::Mirrors;
 use crate::kernel::Isa;
 use crate::texture::linear_from_srgb_table;
@@ -18,6 +19,7 @@ pub struct World {
     pub(crate) blas: Vec<Blas>,
     pub(crate) linear_from_srgb: [f32; 256],
     pub(crate) mirrors: Mirrors,
+    pub(crate) emitters: Emitters,
     pub(crate) isa: Isa,
     /// Tells the moments of this world from those of others.
     pub(crate) id: u64,
@@ -38,6 +40,7 @@ impl World {
         World {
             blas: blas.collect(),
             mirrors: Mirrors::new(&scene),
+            emitters: Emitters::new(&scene),
             scene,
             linear_from_srgb: linear_from_srgb_table(),
             isa,
