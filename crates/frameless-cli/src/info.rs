@@ -152,5 +152,6 @@ fn driven(target: Target) -> &'static str {
         Target::Rotation(_) => "rotation",
         Target::Scale(_) => "scale",
         Target::LightIntensity(_) => "light",
+        Target::MorphWeight(_) => "morph weight",
     }
 }

@@ -104,7 +104,7 @@ impl World {
             first.get_or_insert_with(|| Surface {
                 object: hit.instance,
                 primitive: hit.primitive,
-                position: point.local_position.to_array(),
+                position: point.anchor.to_array(),
                 normal: point.local_normal.to_array(),
                 albedo: albedo.to_array(),
                 direct: (albedo * irradiance).to_array(),

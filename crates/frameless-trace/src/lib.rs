@@ -8,6 +8,7 @@
 mod build;
 mod camera;
 mod cpu;
+mod deforming;
 mod direct;
 mod explain;
 mod kernel;
@@ -16,6 +17,7 @@ mod moment;
 mod order;
 mod point;
 mod ray;
+mod refit;
 mod render;
 mod sphere;
 mod texture;

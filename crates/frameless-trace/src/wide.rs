@@ -1,5 +1,6 @@
 //! The 8-wide bounding volume hierarchy: a binary one collapsed so that one vector instruction tests eight children.
 
+use glam::Vec3A;
 use obvhs::bvh2::Bvh2;
 
 /// Eight children: their boxes and where they are.
@@ -15,8 +16,17 @@ pub(crate) struct Node {
 impl Node {
     const EMPTY: Node = {
         let (low, high) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
-        Node { bounds: [low, high, low, high, low, high], child: [Child(u32::MAX); 8] }
+        Node { bounds: [low, high, low, high, low, high], child: [Node::UNUSED; 8] }
     };
+    /// The child of a slot without one.
+    pub(crate) const UNUSED: Child = Child(u32::MAX);
+
+    /// The smallest box around all children; inside out if there are none.
+    pub(crate) fn bounds(&self) -> (Vec3A, Vec3A) {
+        let least = |row: usize| self.bounds[row].into_iter().fold(f32::INFINITY, f32::min);
+        let most = |row: usize| self.bounds[row].into_iter().fold(f32::NEG_INFINITY, f32::max);
+        (Vec3A::new(least(0), least(2), least(4)), Vec3A::new(most(1), most(3), most(5)))
+    }
 }
 
 /// An inner node's index, or a leaf: bit 31 set, then 2 bits of length − 1, then 29 bits of index.

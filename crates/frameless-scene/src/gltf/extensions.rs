@@ -9,7 +9,8 @@ use super::json::Json;
 use super::warnings::Warnings;
 
 /// Extensions that are read. What of them is not drawn is warned about where it occurs.
-const SUPPORTED: [&str; 5] = [
+const SUPPORTED: [&str; 6] = [
+    "EXT_mesh_gpu_instancing",
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
