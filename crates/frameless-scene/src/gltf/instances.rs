@@ -30,6 +30,8 @@ pub(super) fn place_instances(
         geometry_of: Vec::new(),
         file_skins: skins,
         skin_of: Vec::new(),
+        geometries: 0,
+        skins: 0,
         weights_of: vec![None; nodes.len()],
     };
     placer.geometry_of.resize(placer.file_meshes.len(), None);
@@ -37,12 +39,25 @@ pub(super) fn place_instances(
     for (file_index, node) in nodes.iter().enumerate() {
         placer.place(file_index, node, scene, document, hierarchy)?;
     }
-    let Placer { file_meshes, geometry_of, weights_of, .. } = placer;
-    let mut used: Vec<_> = geometry_of.into_iter().zip(file_meshes).collect();
-    used.retain(|(geometry, _)| geometry.is_some());
-    used.sort_by_key(|(geometry, _)| *geometry);
-    scene.geometries = used.into_iter().map(|(_, mesh)| mesh).collect();
-    Ok(weights_of)
+    scene.geometries = used(placer.geometry_of, placer.file_meshes);
+    scene.skins = used(placer.skin_of, placer.file_skins).into_iter().flatten().collect();
+    Ok(placer.weights_of)
+}
+
+/// The `things` that have a number, in the order of the numbers.
+fn used<T>(numbers: Vec<Option<u32>>, things: Vec<T>) -> Vec<T> {
+    let numbered = numbers.into_iter().zip(things);
+    let mut used: Vec<_> = numbered.filter_map(|(number, thing)| Some((number?, thing))).collect();
+    used.sort_by_key(|(number, _)| *number);
+    used.into_iter().map(|(_, thing)| thing).collect()
+}
+
+/// The number of thing `index`: the next one if it has none yet.
+fn number(numbers: &mut [Option<u32>], index: usize, next: &mut u32) -> u32 {
+    *numbers[index].get_or_insert_with(|| {
+        *next += 1;
+        *next - 1
+    })
 }
 
 struct Placer<'a> {
@@ -53,6 +68,9 @@ struct Placer<'a> {
     file_skins: Vec<Option<Skin>>,
     /// Per skin of the file, once it is used.
     skin_of: Vec<Option<u32>>,
+    /// How many are used so far.
+    geometries: u32,
+    skins: u32,
     weights_of: WeightsOfNode,
 }
 
@@ -87,23 +105,19 @@ impl Placer<'_> {
             Some(places) => add_nodes(&places, index, node, document, hierarchy)?,
             None => vec![index],
         };
-        let used = self.geometry_of.iter().flatten().count() as u32;
-        let geometry = *self.geometry_of[mesh_index].get_or_insert(used);
-        let skin = skin.map(|skin| self.use_skin(skin, scene));
+        let size = (mesh.positions.len(), mesh.triangles.len());
+        let geometry = number(&mut self.geometry_of, mesh_index, &mut self.geometries);
+        let skin = skin.map(|skin| number(&mut self.skin_of, skin, &mut self.skins));
         for node_index in places {
             scene.instances.push(Instance { node: node_index, geometry });
             let count = scene.instances.len() as u64;
             within(count, document.budget.limits.instances, "instances", node.pointer())?;
             if skin.is_some() || !weights.is_empty() {
                 // Every instance that deforms has vertices and triangles of its own.
-                document
-                    .budget
-                    .add_vertices(node.pointer(), mesh_of(&self.file_meshes[mesh_index]).0)?;
-                document
-                    .budget
-                    .add_triangles(node.pointer(), mesh_of(&self.file_meshes[mesh_index]).1)?;
-                let weights = weights.clone();
-                scene.deformations.push(Deformation { instance: count as u32 - 1, skin, weights });
+                document.budget.add_vertices(node.pointer(), size.0)?;
+                document.budget.add_triangles(node.pointer(), size.1)?;
+                let (instance, weights) = (count as u32 - 1, weights.clone());
+                scene.deformations.push(Deformation { instance, skin, weights });
             }
         }
         self.weights_of[file_index] = (!weights.is_empty()).then_some(weights);
@@ -141,13 +155,6 @@ impl Placer<'_> {
         Ok(Some(index))
     }
 
-    fn use_skin(&mut self, index: usize, scene: &mut Scene) -> u32 {
-        *self.skin_of[index].get_or_insert_with(|| {
-            scene.skins.extend(self.file_skins[index].take());
-            scene.skins.len() as u32 - 1
-        })
-    }
-
     /// Appends the weights of a node's mesh: the node's own, else the mesh's, else zeros.
     fn weights(
         &self,
@@ -176,14 +183,6 @@ impl Placer<'_> {
         scene.morph_weights.resize(first + targets, 0.0);
         within(scene.morph_weights.len() as u64, u64::from(u32::MAX), "weights", node.pointer())?;
         Ok(first as u32..(first + targets) as u32)
-    }
-}
-
-/// Vertices and triangles.
-fn mesh_of(geometry: &Geometry) -> (usize, usize) {
-    match geometry {
-        Geometry::Mesh(mesh) => (mesh.positions.len(), mesh.triangles.len()),
-        Geometry::Sphere { .. } => (0, 0),
     }
 }
 
