@@ -27,6 +27,8 @@ mod wide;
 mod world;
 
 #[cfg(test)]
+mod bending;
+#[cfg(test)]
 mod reference;
 #[cfg(test)]
 mod shading;
