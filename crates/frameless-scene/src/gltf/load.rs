@@ -10,6 +10,7 @@ use super::animation::{Nodes, load_animation};
 use super::buffers::{load_buffers, parse_views};
 use super::camera::load_cameras;
 use super::choice::Choice;
+use super::compressed::decode_views;
 use super::container::Container;
 use super::defaults::{add_camera, add_light};
 use super::document::Document;
@@ -86,7 +87,8 @@ fn from_bytes(
     check_version(&root)?;
     check_extensions(&root, &value, &mut warnings)?;
     let buffers = load_buffers(&root, container.bin, folder, &mut budget, &mut warnings)?;
-    let views = parse_views(&root, &buffers)?;
+    let decoded = decode_views(&root, &buffers, &mut budget)?;
+    let views = parse_views(&root, &buffers, &decoded)?;
     let accessors = parse_accessors(&root, &views)?;
     let mut document = Document { root, views, accessors, folder, budget, warnings };
     let mut scene = build(&mut document, choice)?;

@@ -7,7 +7,7 @@
 //!
 //! | read | drawn otherwise, with a warning | ignored with a warning | refused |
 //! |---|---|---|---|
-//! | `.glb`, `.gltf`, `data:` URIs, files in its folder | images that cannot be decoded: a checker | GLB chunks of other types | other versions than 2.x, required extensions that are unknown |
+//! | `.glb`, `.gltf`, `data:` URIs, files in its folder, EXT_meshopt_compression | images that cannot be decoded: a checker | GLB chunks of other types | other versions than 2.x, required extensions that are unknown |
 //! | triangles, strips, fans; indexed or not; normalised, quantised, sparse | joint weights that do not sum to 1: scaled; skins with joints elsewhere: rest shape | points, lines | indices and references that lead nowhere |
 //! | nodes with TRS or matrix, one scene, EXT_mesh_gpu_instancing | sheared matrices: without shear | other scenes | loops, two parents |
 //! | base colour, metallic, roughness, emissive (KHR_materials_emissive_strength), COLOR_0, TEXCOORD_0 and 1, EXT_texture_webp | metallic-roughness and emissive textures: their mean; BLEND, MASK: opaque; unlit: lit | normal and occlusion textures, texture transforms, other extensions | paths out of the folder |
@@ -21,6 +21,7 @@ mod attributes;
 mod buffers;
 mod camera;
 mod choice;
+mod compressed;
 mod container;
 mod defaults;
 mod document;
