@@ -70,8 +70,8 @@ impl Scene {
             let local = match deformations.next_if(deforms) {
                 Some((number, _)) => {
                     self.deform(number, state, &mut deformed);
-                    let finite = |point: &Vec3| point.is_finite();
-                    Bounds::of_points(deformed.positions().iter().copied().filter(finite))
+                    let points = deformed.positions().iter().map(|&point| Vec3::from(point));
+                    Bounds::of_points(points.filter(|point| point.is_finite()))
                 }
                 None => local[instance.geometry as usize],
             };

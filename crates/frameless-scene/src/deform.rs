@@ -11,14 +11,16 @@
 
 use glam::{Affine3A, Mat3A, Vec3, Vec3A, Vec4};
 
-use crate::{Deformation, Geometry, Influences, Mesh, Scene, State};
+use crate::{Deformation, Geometry, Mesh, Scene, State};
 
 /// The vertices of one deforming instance, and the pose that they belong to. Its memory is used again for the next pose.
 #[derive(Clone, Debug, Default)]
 pub struct Deformed {
-    positions: Vec<Vec3>,
-    normals: Vec<Vec3>,
+    positions: Vec<Vec3A>,
+    normals: Vec<Vec3A>,
     colors: Vec<Vec4>,
+    /// Positions and normals of a mesh with morph targets, before the skin.
+    morphed: [Vec<Vec3>; 2],
     /// World from mesh, per joint: of the vertices, and of a pose that is being compared.
     joints: Vec<Affine3A>,
     next_joints: Vec<Affine3A>,
@@ -30,12 +32,12 @@ pub struct Deformed {
 impl Deformed {
     /// As many as the mesh has vertices, in the instance's coordinates (the world's, if it is skinned). Infinite or NaN where
     /// transforms overflow.
-    pub fn positions(&self) -> &[Vec3] {
+    pub fn positions(&self) -> &[Vec3A] {
         &self.positions
     }
 
     /// Of length one or zero; none if the mesh has none.
-    pub fn normals(&self) -> &[Vec3] {
+    pub fn normals(&self) -> &[Vec3A] {
         &self.normals
     }
 
@@ -63,10 +65,7 @@ impl Scene {
         deformed.weights.extend_from_slice(weights);
         let instance = self.instances[deformation.instance as usize];
         if let Geometry::Mesh(mesh) = &self.geometries[instance.geometry as usize] {
-            deformed.morph(mesh);
-            if deformation.skin.is_some() {
-                deformed.skin(mesh);
-            }
+            deformed.take_pose(mesh, deformation.skin.is_some());
         }
         true
     }
@@ -94,58 +93,81 @@ impl Scene {
 }
 
 impl Deformed {
-    fn morph(&mut self, mesh: &Mesh) {
-        self.positions.clone_from(&mesh.positions);
-        self.normals.clone_from(&mesh.normals);
+    fn take_pose(&mut self, mesh: &Mesh, is_skinned: bool) {
         self.colors.clone_from(&mesh.colors);
-        let mut changed = [false; 2];
+        let mut morphed = std::mem::take(&mut self.morphed);
+        let (positions, normals) = if mesh.targets.is_empty() {
+            (&mesh.positions, &mesh.normals)
+        } else {
+            self.morph(mesh, &mut morphed);
+            (&morphed[0], &morphed[1])
+        };
+        if is_skinned {
+            self.skin(mesh, positions, normals);
+        } else {
+            self.positions.clear();
+            self.positions.extend(positions.iter().map(|&position| Vec3A::from(position)));
+            self.normals.clear();
+            self.normals.extend(normals.iter().map(|&normal| Vec3A::from(normal)));
+        }
+        self.morphed = morphed;
+    }
+
+    /// Adds the targets, to positions and normals there and to the colours here.
+    fn morph(&mut self, mesh: &Mesh, [positions, normals]: &mut [Vec<Vec3>; 2]) {
+        positions.clone_from(&mesh.positions);
+        normals.clone_from(&mesh.normals);
+        let [mut turned, mut tinted] = [false; 2];
         for (target, &weight) in mesh.targets.iter().zip(&self.weights) {
             if weight == 0.0 {
                 continue;
             }
-            add(&mut self.positions, &target.positions, weight);
-            add(&mut self.normals, &target.normals, weight);
+            add(positions, &target.positions, weight);
+            add(normals, &target.normals, weight);
             add(&mut self.colors, &target.colors, weight);
-            changed[0] |= !target.normals.is_empty();
-            changed[1] |= !target.colors.is_empty();
+            turned |= !target.normals.is_empty();
+            tinted |= !target.colors.is_empty();
         }
-        if changed[0] {
-            self.normals.iter_mut().for_each(|normal| *normal = normal.normalize_or_zero());
+        if turned {
+            normals.iter_mut().for_each(|normal| *normal = normal.normalize_or_zero());
         }
-        if changed[1] {
+        if tinted {
             // What is no number becomes 0.
             let sane = |c: &mut Vec4| *c = c.max(Vec4::ZERO).min(Vec4::ONE);
             self.colors.iter_mut().for_each(sane);
         }
     }
 
-    fn skin(&mut self, mesh: &Mesh) {
-        let Deformed { positions, normals, joints, .. } = self;
-        let matrix = |vertex: usize| match &mesh.influences[..] {
-            [set] => blend(set, vertex, joints),
-            sets => sets.iter().map(|set| blend(set, vertex, joints)).fold(ZERO, plus),
+    fn skin(&mut self, mesh: &Mesh, positions: &[Vec3], normals: &[Vec3]) {
+        let joints = &self.joints[..];
+        let (first, others) = mesh.influences.split_first().expect("a skinned mesh has joints");
+        let matrix = |vertex: usize, (&joint, &weight): (&[u16; 4], &[f32; 4])| {
+            let more = others.iter().map(|set| (&set.joints[vertex], &set.weights[vertex]));
+            more.fold(blend(joints, joint, weight), |sum, (&joint, &weight)| {
+                plus(sum, blend(joints, joint, weight))
+            })
         };
+        let influences = first.joints.iter().zip(&first.weights).enumerate();
+        let matrices = influences.map(|(vertex, influence)| matrix(vertex, influence));
+        self.positions.clear();
+        self.normals.clear();
         if normals.is_empty() {
-            for (vertex, position) in positions.iter_mut().enumerate() {
-                *position = matrix(vertex).transform_point3(*position);
-            }
+            let moved = positions.iter().zip(matrices);
+            self.positions.extend(moved.map(|(&p, matrix)| matrix.transform_point3a(p.into())));
             return;
         }
-        for (vertex, (position, normal)) in positions.iter_mut().zip(normals).enumerate() {
-            let world_from_mesh = matrix(vertex);
-            *position = world_from_mesh.transform_point3(*position);
-            let turned = cofactors(&world_from_mesh.matrix3) * Vec3A::from(*normal);
-            *normal = turned.normalize_or_zero().into();
-        }
+        self.normals.resize(normals.len(), Vec3A::ZERO);
+        let moved = positions.iter().zip(matrices).zip(normals.iter().zip(&mut self.normals));
+        self.positions.extend(moved.map(|((&position, matrix), (&normal, turned))| {
+            *turned = (cofactors(&matrix.matrix3) * Vec3A::from(normal)).normalize_or_zero();
+            matrix.transform_point3a(position.into())
+        }));
     }
 }
 
-const ZERO: Affine3A = Affine3A { matrix3: Mat3A::ZERO, translation: Vec3A::ZERO };
-
 /// Σ s_j · M_j over the four joints of a set.
 #[inline(always)]
-fn blend(set: &Influences, vertex: usize, joints: &[Affine3A]) -> Affine3A {
-    let (joint, weight) = (set.joints[vertex], set.weights[vertex]);
+fn blend(joints: &[Affine3A], joint: [u16; 4], weight: [f32; 4]) -> Affine3A {
     let part = |k: usize| scaled(&joints[usize::from(joint[k])], weight[k]);
     plus(plus(part(0), part(1)), plus(part(2), part(3)))
 }

@@ -58,7 +58,8 @@ fn mesh(scene: &Scene) -> &Mesh {
 fn frozen(scene: &Scene, secs: f64) -> Mesh {
     let mut now = frameless_scene::Deformed::default();
     scene.deform(0, &scene.state_at(secs), &mut now);
-    Mesh { positions: now.positions().to_vec(), ..mesh(scene).clone() }
+    let positions = now.positions().iter().map(|&position| position.into()).collect();
+    Mesh { positions, ..mesh(scene).clone() }
 }
 
 #[test]
@@ -147,13 +148,14 @@ fn portable_and_fastest_code_see_the_same_deforming_mesh() {
 fn vertices_that_are_nowhere_take_only_their_triangles_away() {
     let mut rng = Rng::new(5);
     let mesh = random_soup(&mut rng, 300, 0.5);
-    let mut positions = mesh.positions.clone();
+    let at_rest: Vec<Vec3A> = mesh.positions.iter().map(|&p| p.into()).collect();
+    let mut positions = at_rest.clone();
     let mut tree = Flexible::new(&mesh, &positions);
     let bad = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 3e38, -1e16];
     for (k, bad) in bad.into_iter().enumerate() {
         positions[30 * k][k % 3] = bad;
     }
-    positions[600..603].fill(Vec3::NAN);
+    positions[600..603].fill(Vec3A::NAN);
     tree.update(&mesh, &positions);
     let is_sane = |v: &u32| positions[*v as usize].to_array().iter().all(|x| x.abs() < 1e15);
     let sane = |&p: &u32| mesh.triangles[p as usize].iter().all(is_sane);
@@ -176,10 +178,10 @@ fn vertices_that_are_nowhere_take_only_their_triangles_away() {
     assert_eq!(drawn, kept);
     let (low, high) = tree.blas.bounds.expect("there are triangles");
     assert!(low.min_element() > -5.0 && high.max_element() < 5.0, "{low} {high}");
-    tree.update(&mesh, &mesh.positions);
+    tree.update(&mesh, &at_rest);
     let (low, high) = tree.blas.bounds.expect("there are triangles");
     assert!(low.is_finite() && high.cmpgt(low).all());
-    tree.update(&mesh, &vec![Vec3::NAN; positions.len()]);
+    tree.update(&mesh, &vec![Vec3A::NAN; positions.len()]);
     assert!(Flexible::new(&Mesh::default(), &[]).blas.bounds.is_none());
 }
 
@@ -209,10 +211,11 @@ fn joints_that_overflow_hit_nothing() {
 fn a_tree_that_has_become_bad_is_built_anew() {
     let mut rng = Rng::new(7);
     let mesh = random_soup(&mut rng, 1_000, 0.2);
-    let mut tree = Flexible::new(&mesh, &mesh.positions);
+    let at_rest: Vec<Vec3A> = mesh.positions.iter().map(|&p| p.into()).collect();
+    let mut tree = Flexible::new(&mesh, &at_rest);
     let built = tree.blas.packs.as_ptr();
     // A little to the side: the same memory, the same shape.
-    let moved: Vec<Vec3> = mesh.positions.iter().map(|p| 1.1 * *p + Vec3::X).collect();
+    let moved: Vec<Vec3A> = at_rest.iter().map(|p| 1.1 * *p + Vec3A::X).collect();
     tree.update(&mesh, &moved);
     assert_eq!(tree.blas.packs.as_ptr(), built, "memory was allocated");
     // Every triangle to the place of another.
@@ -220,8 +223,8 @@ fn a_tree_that_has_become_bad_is_built_anew() {
     for k in (1..1_000).rev() {
         order.swap(k, rng.below(k as u32 + 1) as usize);
     }
-    let shuffled: Vec<Vec3> =
-        order.iter().flat_map(|&k| mesh.positions[3 * k..3 * k + 3].to_vec()).collect();
+    let shuffled: Vec<Vec3A> =
+        order.iter().flat_map(|&k| at_rest[3 * k..3 * k + 3].to_vec()).collect();
     let followed = tree.clone().refit(&shuffled);
     let fresh = Flexible::new(&mesh, &shuffled).refit(&shuffled);
     assert!(followed > 2.0 * fresh, "{followed} {fresh}: no reason to build");

@@ -1,9 +1,8 @@
 //! The point that a ray hit: where it is, which way it faces, what it is made of.
 
-use frameless_scene::{Geometry, Material, Mesh};
-use glam::{Vec2, Vec3, Vec3A, Vec4};
+use frameless_scene::{Deformed, Geometry, Material, Mesh};
+use glam::{Vec2, Vec3A, Vec4};
 
-use crate::deforming::Deforming;
 use crate::moment::Moment;
 use crate::ray::{Hit, Ray};
 use crate::sphere;
@@ -62,11 +61,14 @@ impl Point {
         let local_ray = ray.transformed(&placed.object_from_world);
         let local = match &scene.geometries[geometry as usize] {
             Geometry::Mesh(mesh) => {
-                let deforming = moment.deforming(placed);
-                let vertices = deforming.map_or_else(|| Vertices::of(mesh), Vertices::deformed);
-                let local = on_mesh(mesh, &vertices, &scene.materials, &local_ray, hit);
-                let anchor = if deforming.is_some() { weights(hit).into() } else { local.anchor };
-                Local { anchor, ..local }
+                let materials = &scene.materials;
+                match moment.deforming(placed) {
+                    None => on_mesh(mesh, &Rigid(mesh), materials, &local_ray, hit),
+                    Some(deforming) => {
+                        let local = on_mesh(mesh, deforming.now(), materials, &local_ray, hit);
+                        Local { anchor: weights(hit).into(), ..local }
+                    }
+                }
             }
             Geometry::Sphere { material } => on_sphere(*material, &local_ray, hit.t),
         };
@@ -77,21 +79,47 @@ impl Point {
     }
 }
 
-/// The part of a mesh that may deform.
-struct Vertices<'a> {
-    positions: &'a [Vec3],
-    normals: &'a [Vec3],
-    colors: &'a [Vec4],
+/// What of a mesh may deform.
+trait Vertices {
+    fn position(&self, vertex: usize) -> Vec3A;
+    /// `None` if the mesh has no normals.
+    fn normal(&self, vertex: usize) -> Option<Vec3A>;
+    fn colors(&self) -> &[Vec4];
 }
 
-impl<'a> Vertices<'a> {
-    fn of(mesh: &'a Mesh) -> Vertices<'a> {
-        Vertices { positions: &mesh.positions, normals: &mesh.normals, colors: &mesh.colors }
+struct Rigid<'a>(&'a Mesh);
+
+impl Vertices for Rigid<'_> {
+    #[inline(always)]
+    fn position(&self, vertex: usize) -> Vec3A {
+        self.0.positions[vertex].into()
     }
 
-    fn deformed(deforming: &'a Deforming) -> Vertices<'a> {
-        let now = deforming.now();
-        Vertices { positions: now.positions(), normals: now.normals(), colors: now.colors() }
+    #[inline(always)]
+    fn normal(&self, vertex: usize) -> Option<Vec3A> {
+        self.0.normals.get(vertex).map(|&normal| normal.into())
+    }
+
+    #[inline(always)]
+    fn colors(&self) -> &[Vec4] {
+        &self.0.colors
+    }
+}
+
+impl Vertices for Deformed {
+    #[inline(always)]
+    fn position(&self, vertex: usize) -> Vec3A {
+        self.positions()[vertex]
+    }
+
+    #[inline(always)]
+    fn normal(&self, vertex: usize) -> Option<Vec3A> {
+        self.normals().get(vertex).copied()
+    }
+
+    #[inline(always)]
+    fn colors(&self) -> &[Vec4] {
+        self.colors()
     }
 }
 
@@ -128,21 +156,27 @@ fn on_sphere(material: u32, ray: &Ray, t: f32) -> Local {
 }
 
 #[inline]
-fn on_mesh(mesh: &Mesh, now: &Vertices<'_>, materials: &[Material], ray: &Ray, hit: &Hit) -> Local {
+fn on_mesh(
+    mesh: &Mesh,
+    now: &impl Vertices,
+    materials: &[Material],
+    ray: &Ray,
+    hit: &Hit,
+) -> Local {
     let material = mesh.triangle_materials[hit.primitive as usize];
     let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
-    let corners = vertices.map(|vertex| Vec3A::from(now.positions[vertex]));
+    let corners = vertices.map(|vertex| now.position(vertex));
     let [a, b, c] = corners;
     let weights = weights(hit);
     let position = blend(weights, corners);
     let winding_normal = (b - a).cross(c - a);
     let geometric_normal = facing(winding_normal, -ray.direction);
-    let (normal, shadow_origin) = if now.normals.is_empty() {
-        (geometric_normal, position)
-    } else {
-        let normals = vertices.map(|vertex| Vec3A::from(now.normals[vertex]));
-        let normals = normals.map(|normal| facing(normal, geometric_normal));
-        (blend(weights, normals), on_smooth_surface(position, weights, corners, normals))
+    let (normal, shadow_origin) = match vertices.map(|vertex| now.normal(vertex)) {
+        [Some(a), Some(b), Some(c)] => {
+            let normals = [a, b, c].map(|normal| facing(normal, geometric_normal));
+            (blend(weights, normals), on_smooth_surface(position, weights, corners, normals))
+        }
+        _ => (geometric_normal, position),
     };
     let uv = match materials[material as usize].base_color_texture {
         Some(reference) if !mesh.uvs[reference.uv_set as usize].is_empty() => {
@@ -152,12 +186,12 @@ fn on_mesh(mesh: &Mesh, now: &Vertices<'_>, materials: &[Material], ray: &Ray, h
         }
         _ => Vec2::ZERO.to_array(),
     };
-    let color = if now.colors.is_empty() {
+    let color = if now.colors().is_empty() {
         Vec3A::ONE
     } else {
         blend(
             weights,
-            vertices.map(|vertex| Vec3A::from_vec4(Vec4::max(now.colors[vertex], Vec4::ZERO))),
+            vertices.map(|vertex| Vec3A::from_vec4(Vec4::max(now.colors()[vertex], Vec4::ZERO))),
         )
     };
     let extent = a.abs().max(b.abs()).max(c.abs());

@@ -24,6 +24,9 @@ pub(crate) struct Flexible {
     pub(crate) blas: Blas,
     /// The vertices of the packs' triangles: `[corner][lane]`.
     vertices: Vec<[[u32; 4]; 3]>,
+    /// Per pack and per node: the box around it.
+    pack_boxes: Vec<[Vec3A; 2]>,
+    node_boxes: Vec<[Vec3A; 2]>,
     /// C when the tree was built.
     cost_built: f32,
 }
@@ -31,127 +34,131 @@ pub(crate) struct Flexible {
 impl Flexible {
     /// A tree for the mesh with its vertices at `positions`. Unlike [`Blas::new`] it holds every triangle, since those that
     /// are nowhere now may be somewhere later.
-    pub(crate) fn new(mesh: &Mesh, positions: &[Vec3]) -> Flexible {
+    pub(crate) fn new(mesh: &Mesh, positions: &[Vec3A]) -> Flexible {
         let corners = |primitive: u32| {
-            sane(mesh.triangles[primitive as usize].map(|vertex| positions[vertex as usize]))
+            sane(mesh.triangles[primitive as usize].map(|v| positions[v as usize]))
         };
         let primitives: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
-        let boxes = primitives.iter().map(|&p| Aabb::from_points(&corners(p).map(Vec3A::from)));
-        let blas = Blas::over(&primitives, &boxes.collect::<Vec<_>>(), corners);
+        let boxes = primitives.iter().map(|&primitive| Aabb::from_points(&corners(primitive)));
+        let boxes: Vec<Aabb> = boxes.collect();
+        let blas = Blas::over(&primitives, &boxes, |primitive| corners(primitive).map(Vec3::from));
         let vertices = blas.packs.iter().map(|pack| {
             let lanes = pack.primitive.map(|primitive| mesh.triangles[primitive as usize]);
             std::array::from_fn(|corner| lanes.map(|triangle| triangle[corner]))
         });
-        let mut flexible = Flexible { vertices: vertices.collect(), blas, cost_built: 0.0 };
-        flexible.cost_built = flexible.fit_boxes();
+        let mut flexible = Flexible {
+            vertices: vertices.collect(),
+            pack_boxes: vec![NOTHING; blas.packs.len()],
+            node_boxes: vec![NOTHING; blas.nodes.len()],
+            blas,
+            cost_built: 0.0,
+        };
+        flexible.cost_built = flexible.refit(positions);
         flexible
     }
 
     /// The tree with the vertices at `positions`, for which it is built anew if need be. Triangles with a vertex that is
     /// infinite, NaN or too far away have no area, so that no ray meets them.
-    pub(crate) fn update(&mut self, mesh: &Mesh, positions: &[Vec3]) {
+    pub(crate) fn update(&mut self, mesh: &Mesh, positions: &[Vec3A]) {
         if self.refit(positions) > WORST * self.cost_built {
             *self = Flexible::new(mesh, positions);
         }
     }
 
     /// Moves triangles and boxes; returns C.
-    pub(crate) fn refit(&mut self, positions: &[Vec3]) -> f32 {
-        for (pack, vertices) in self.blas.packs.iter_mut().zip(&self.vertices) {
-            move_pack(pack, vertices, positions);
+    pub(crate) fn refit(&mut self, positions: &[Vec3A]) -> f32 {
+        let packs = self.blas.packs.iter_mut().zip(&self.vertices).zip(&mut self.pack_boxes);
+        if are_all_sane(positions) {
+            packs.for_each(|((pack, vertices), bounds)| {
+                *bounds = move_pack(pack, vertices, positions, |triangle| triangle);
+            });
+        } else {
+            packs.for_each(|((pack, vertices), bounds)| {
+                *bounds = move_pack(pack, vertices, positions, sane);
+            });
         }
         self.fit_boxes()
     }
 
     /// Boxes from the leaves up: children come after their parents. Returns C.
     fn fit_boxes(&mut self) -> f32 {
-        let Blas { nodes, packs, bounds } = &mut self.blas;
+        let Flexible { blas: Blas { nodes, bounds, .. }, pack_boxes, node_boxes, .. } = self;
         let mut work = 0.0;
-        for index in (0..nodes.len()).rev() {
-            let mut node = nodes[index];
+        for (index, node) in nodes.iter_mut().enumerate().rev() {
+            let mut around = NOTHING;
             for slot in 0..8 {
                 let child = node.child[slot];
                 if child == Node::UNUSED {
                     continue;
                 }
-                let (low, high, cost) = if child.is_leaf() {
-                    let packs = &packs[child.items()];
-                    let (low, high) = box_of_packs(packs);
-                    (low, high, packs.len() as f32)
+                let (inside, cost) = if child.is_leaf() {
+                    let packs = &pack_boxes[child.items()];
+                    (packs.iter().copied().fold(NOTHING, union), packs.len() as f32)
                 } else {
-                    let (low, high) = nodes[child.node()].bounds();
-                    (low, high, 1.0)
+                    (node_boxes[child.node()], 1.0)
                 };
+                let [low, high] = inside;
                 for axis in 0..3 {
                     node.bounds[2 * axis][slot] = low[axis];
                     node.bounds[2 * axis + 1][slot] = high[axis];
                 }
-                work += cost * half_area(low, high);
+                work += cost * half_area(inside);
+                around = union(around, inside);
             }
-            nodes[index] = node;
+            node_boxes[index] = around;
         }
-        let (low, high) = nodes[0].bounds();
+        let [low, high] = node_boxes[0];
         *bounds = low.cmple(high).all().then_some((low, high));
         // A mesh that is a point costs nothing.
-        work / half_area(low, high).max(f32::MIN_POSITIVE)
+        work / half_area(node_boxes[0]).max(f32::MIN_POSITIVE)
     }
 }
 
+/// The box around nothing.
+const NOTHING: [Vec3A; 2] = [Vec3A::INFINITY, Vec3A::NEG_INFINITY];
+
 #[inline(always)]
-fn half_area(low: Vec3A, high: Vec3A) -> f32 {
+fn union(a: [Vec3A; 2], b: [Vec3A; 2]) -> [Vec3A; 2] {
+    [a[0].min(b[0]), a[1].max(b[1])]
+}
+
+#[inline(always)]
+fn half_area([low, high]: [Vec3A; 2]) -> f32 {
     let d = high - low;
     d.x * d.y + d.y * d.z + d.z * d.x
 }
 
+/// Whether no vertex is too far away, infinite or NaN: so is the sum, then. It may err on the safe side.
+fn are_all_sane(positions: &[Vec3A]) -> bool {
+    let sum = positions.iter().fold(Vec3A::ZERO, |sum, position| sum + position.abs());
+    sum.cmplt(Vec3A::splat(FARTHEST)).all()
+}
+
 /// The triangle, or a point of it if it is not finite.
-fn sane(corners: [Vec3; 3]) -> [Vec3; 3] {
-    let is_sane = |corner: &Vec3| corner.abs().max_element() < FARTHEST && !corner.is_nan();
+fn sane(corners: [Vec3A; 3]) -> [Vec3A; 3] {
+    let is_sane = |corner: &Vec3A| corner.abs().cmplt(Vec3A::splat(FARTHEST)).all();
     if corners.iter().all(is_sane) {
         return corners;
     }
-    [corners.into_iter().find(is_sane).unwrap_or(Vec3::ZERO); 3]
+    [corners.into_iter().find(is_sane).unwrap_or(Vec3A::ZERO); 3]
 }
 
+/// Moves the pack's triangles, each as `mend` leaves it; returns the box around them.
 #[inline(always)]
-fn move_pack(pack: &mut Pack, vertices: &[[u32; 4]; 3], positions: &[Vec3]) {
-    // NaN if any coordinate is; the sum of nine sane ones is less than this.
-    let mut size = [0.0_f32; 4];
-    for (corner, lanes) in pack.vertex.iter_mut().zip(vertices) {
-        for lane in 0..4 {
-            let position = positions[lanes[lane] as usize];
-            for axis in 0..3 {
-                corner[axis][lane] = position[axis];
-                size[lane] += position[axis].abs();
-            }
-        }
+fn move_pack(
+    pack: &mut Pack,
+    vertices: &[[u32; 4]; 3],
+    positions: &[Vec3A],
+    mend: impl Fn([Vec3A; 3]) -> [Vec3A; 3],
+) -> [Vec3A; 2] {
+    let lanes: [[Vec3A; 3]; 4] = std::array::from_fn(|lane| {
+        mend(std::array::from_fn(|corner| positions[vertices[corner][lane] as usize]))
+    });
+    let mut around = NOTHING;
+    for corner in 0..3 {
+        let [a, b, c, d] = std::array::from_fn(|lane| lanes[lane][corner]);
+        pack.vertex[corner] = [[a.x, b.x, c.x, d.x], [a.y, b.y, c.y, d.y], [a.z, b.z, c.z, d.z]];
+        around = union(around, [a.min(b).min(c.min(d)), a.max(b).max(c.max(d))]);
     }
-    if !size.iter().all(|&size| size < FARTHEST) {
-        mend(pack, vertices, positions);
-    }
-}
-
-#[cold]
-fn mend(pack: &mut Pack, vertices: &[[u32; 4]; 3], positions: &[Vec3]) {
-    for lane in 0..4 {
-        let corners = vertices.map(|lanes| positions[lanes[lane] as usize]);
-        for (corner, position) in pack.vertex.iter_mut().zip(sane(corners)) {
-            (0..3).for_each(|axis| corner[axis][lane] = position[axis]);
-        }
-    }
-}
-
-#[inline(always)]
-fn box_of_packs(packs: &[Pack]) -> (Vec3A, Vec3A) {
-    let (mut low, mut high) = ([[f32::INFINITY; 4]; 3], [[f32::NEG_INFINITY; 4]; 3]);
-    for corner in packs.iter().flat_map(|pack| &pack.vertex) {
-        for axis in 0..3 {
-            for lane in 0..4 {
-                low[axis][lane] = low[axis][lane].min(corner[axis][lane]);
-                high[axis][lane] = high[axis][lane].max(corner[axis][lane]);
-            }
-        }
-    }
-    let least = low.map(|lanes| lanes.into_iter().fold(f32::INFINITY, f32::min));
-    let most = high.map(|lanes| lanes.into_iter().fold(f32::NEG_INFINITY, f32::max));
-    (Vec3A::from_array(least), Vec3A::from_array(most))
+    around
 }

@@ -1,6 +1,5 @@
 //! The 8-wide bounding volume hierarchy: a binary one collapsed so that one vector instruction tests eight children.
 
-use glam::Vec3A;
 use obvhs::bvh2::Bvh2;
 
 /// Eight children: their boxes and where they are.
@@ -20,13 +19,6 @@ impl Node {
     };
     /// The child of a slot without one.
     pub(crate) const UNUSED: Child = Child(u32::MAX);
-
-    /// The smallest box around all children; inside out if there are none.
-    pub(crate) fn bounds(&self) -> (Vec3A, Vec3A) {
-        let least = |row: usize| self.bounds[row].into_iter().fold(f32::INFINITY, f32::min);
-        let most = |row: usize| self.bounds[row].into_iter().fold(f32::NEG_INFINITY, f32::max);
-        (Vec3A::new(least(0), least(2), least(4)), Vec3A::new(most(1), most(3), most(5)))
-    }
 }
 
 /// An inner node's index, or a leaf: bit 31 set, then 2 bits of length − 1, then 29 bits of index.

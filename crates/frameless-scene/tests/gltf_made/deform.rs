@@ -49,8 +49,9 @@ fn deformed(scene: &Scene, index: usize, secs: f64) -> (Vec<Vec3>, Vec<Vec3>) {
     assert!(!scene.deform(index, &state, &mut deformed), "the pose is the same");
     let instance = scene.deformations[index].instance as usize;
     let world = scene.world_from_instance(instance, &state);
-    let positions = deformed.positions().iter().map(|&p| world.transform_point3(p)).collect();
-    (positions, deformed.normals().to_vec())
+    let positions = deformed.positions().iter();
+    let positions = positions.map(|&p| world.transform_point3a(p).into()).collect();
+    (positions, deformed.normals().iter().map(|&normal| normal.into()).collect())
 }
 
 fn assert_close(came: &[Vec3], expected: &[[f32; 3]]) {
