@@ -66,6 +66,10 @@ pub struct Contents {
 
 /// A shape.
 #[derive(Clone, Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "nearly all are meshes, and a box would be one more look at memory per sample"
+)]
 pub enum Geometry {
     /// Triangles.
     Mesh(Mesh),

@@ -155,9 +155,9 @@ fn move_pack(
         mend(std::array::from_fn(|corner| positions[vertices[corner][lane] as usize]))
     });
     let mut around = NOTHING;
-    for corner in 0..3 {
+    for (corner, moved) in pack.vertex.iter_mut().enumerate() {
         let [a, b, c, d] = std::array::from_fn(|lane| lanes[lane][corner]);
-        pack.vertex[corner] = [[a.x, b.x, c.x, d.x], [a.y, b.y, c.y, d.y], [a.z, b.z, c.z, d.z]];
+        *moved = [[a.x, b.x, c.x, d.x], [a.y, b.y, c.y, d.y], [a.z, b.z, c.z, d.z]];
         around = union(around, [a.min(b).min(c.min(d)), a.max(b).max(c.max(d))]);
     }
     around
