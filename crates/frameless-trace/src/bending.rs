@@ -201,7 +201,7 @@ fn joints_that_overflow_hit_nothing() {
         }
         let mut pose = frameless::Pose::default();
         let view = world.scene().view_at(moment.state(), 0);
-        moment.pose(&view, scenes::SIZE, &mut pose);
+        world.pose(&moment, &view, scenes::SIZE, &mut pose);
         let deformed = pose.deformed[0].as_ref().expect("it deforms");
         assert!(deformed.positions.iter().flatten().all(|x| x.is_finite()));
     }

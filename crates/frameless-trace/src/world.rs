@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use crate::build::Blas;
 use crate::deforming::Deforming;
+use crate::images::Mirrors;
 use crate::kernel::Isa;
 use crate::texture::linear_from_srgb_table;
 
@@ -19,6 +20,7 @@ pub struct World {
     /// Per deformation of the scene: what its first moment begins with.
     pub(crate) deforming: Vec<Deforming>,
     pub(crate) linear_from_srgb: [f32; 256],
+    pub(crate) mirrors: Mirrors,
     pub(crate) isa: Isa,
     /// Tells the moments of this world from those of others.
     pub(crate) id: u64,
@@ -41,6 +43,7 @@ impl World {
         World {
             blas: blas.collect(),
             deforming: Deforming::all(&scene),
+            mirrors: Mirrors::new(&scene),
             scene,
             linear_from_srgb: linear_from_srgb_table(),
             isa,

@@ -82,14 +82,36 @@ fn bending_sheet() -> Scene {
     }
 }
 
-/// Of `tries` random samples at `then_secs`: how many hit something that deforms, and how many of those are seen again at
+/// The sheet above a mirror that lies on the floor.
+fn mirrored_sheet() -> Scene {
+    let mut scene = bending_sheet();
+    let mirror = Material { metallic: 1.0, roughness: 0.0, ..Material::default() };
+    scene.materials.push(mirror);
+    let corners = [[-4.0, 4.0], [4.0, 4.0], [4.0, -4.0], [-4.0, -4.0]];
+    scene.geometries.push(Geometry::Mesh(Mesh {
+        positions: corners.map(|[x, z]| Vec3::new(x, -1.7, z)).to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        triangle_materials: vec![1; 2],
+        ..Mesh::default()
+    }));
+    scene.instances.push(Instance { node: 1, geometry: 1 });
+    scene.nodes[0] = node(0.0, -0.8, 5.0);
+    scene
+}
+
+/// Of `tries` random samples at `then_secs`: how many hit something that deforms (itself, or its image in a mirror), and how many of those are seen again at
 /// `now_secs` at the very pixel and place in the triangle; panics if one is neither seen nor covered.
-fn seen_again(world: &World, [then_secs, now_secs]: [f64; 2], tries: u32) -> [u32; 2] {
+fn seen_again(
+    world: &World,
+    in_mirror: bool,
+    [then_secs, now_secs]: [f64; 2],
+    tries: u32,
+) -> [u32; 2] {
     let size = Size::new(512, 384);
     let [then, now] = [then_secs, now_secs].map(|secs| world.moment(secs));
     let [view_then, view_now] = [&then, &now].map(|m| world.scene().view_at(m.state(), 0));
     let mut pose = Pose::default();
-    now.pose(&view_now, size, &mut pose);
+    world.pose(&now, &view_now, size, &mut pose);
     let (mut rng, settings) = (Rng::new(7), Settings::default());
     let (mut hits, mut seen) = (0, 0);
     for _ in 0..tries {
@@ -97,11 +119,14 @@ fn seen_again(world: &World, [then_secs, now_secs]: [f64; 2], tries: u32) -> [u3
         let offset = [rng.unit_f32() - 0.5, rng.unit_f32() - 0.5];
         let request = Request { pixel, offset, sample_index: 0 };
         let (_, before) = world.trace(&then, &view_then, size, &request, &settings);
-        if world.scene().deformation_of(before.object as usize).is_none() {
+        let is_image = before.object as usize >= world.scene().instances.len();
+        let deforms = pose.deformed.get(before.object as usize).is_some_and(Option::is_some);
+        if !deforms || is_image != in_mirror {
             continue;
         }
         hits += 1;
-        let there = pose.project(&before).expect("before the camera");
+        // It may have moved out of the mirror.
+        let Some(there) = pose.project(&before) else { continue };
         let [x, y] = there.px;
         if !(0.0..size.width as f32).contains(&x) || !(0.0..size.height as f32).contains(&y) {
             continue;
@@ -129,12 +154,33 @@ fn seen_again(world: &World, [then_secs, now_secs]: [f64; 2], tries: u32) -> [u3
 fn samples_of_a_bending_sheet_are_found_again_at_the_right_pixel() {
     let world = World::new(Arc::new(bending_sheet()));
     for times in [[0.0, 0.0], [0.0, 0.2], [0.1, 0.35], [0.5, 0.0]] {
-        let [hits, seen] = seen_again(&world, times, 3_000);
+        let [hits, seen] = seen_again(&world, false, times, 3_000);
         assert!(
             hits > 800 && f64::from(seen) > 0.93 * f64::from(hits),
             "{times:?}: {seen} of {hits}"
         );
     }
+}
+
+#[test]
+fn samples_of_a_bending_sheet_in_a_mirror_are_found_again() {
+    let world = World::new(Arc::new(mirrored_sheet()));
+    let [hits, seen] = seen_again(&world, true, [0.1, 0.3], 6_000);
+    assert!(hits > 200 && f64::from(seen) > 0.8 * f64::from(hits), "{seen} of {hits}");
+}
+
+#[test]
+fn a_mirror_that_bends_is_no_plane() {
+    let mut scene = bending_sheet();
+    scene.materials[0] = Material { metallic: 1.0, roughness: 0.0, ..Material::default() };
+    let world = World::new(Arc::new(scene));
+    let (moment, mut pose) = (world.moment(0.0), Pose::default());
+    let view = world.scene().view_at(moment.state(), 0);
+    world.pose(&moment, &view, SIZE, &mut pose);
+    assert_eq!((pose.windows.len(), pose.picture_from_object.len()), (0, 1));
+    let request = Request::centre(SIZE.index(SIZE.width / 2, SIZE.height / 2));
+    let (_, surface) = world.trace(&moment, &view, SIZE, &request, &Settings::default());
+    assert_eq!(surface.object, 0, "the sheet itself, not what it reflects");
 }
 
 #[test]
@@ -153,7 +199,7 @@ fn samples_of_real_models_are_found_again() {
     ] {
         let scene = frameless_scene::load(&folder.join(file), &Limits::default()).expect(file);
         let world = World::new(Arc::new(scene));
-        let [hits, seen] = seen_again(&world, [0.5, 0.6], 8_000);
+        let [hits, seen] = seen_again(&world, false, [0.5, 0.6], 8_000);
         assert!(hits > 200, "{file}: {hits}");
         assert!(f64::from(seen) > at_least * f64::from(hits), "{file}: {seen} of {hits}");
     }

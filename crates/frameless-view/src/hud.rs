@@ -7,8 +7,8 @@ use eframe::egui::{
 use frameless::Size;
 use frameless_scene::Scene;
 
-use crate::command::Status;
 use crate::theme;
+use frameless_session::Status;
 
 /// The lines of the HUD.
 pub(crate) fn lines(status: &Status, size: Size, scene: &Scene) -> Vec<String> {
@@ -111,7 +111,7 @@ fn shortened(note: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shown::Ages;
+    use frameless_session::Ages;
 
     #[test]
     fn thousands_are_separated() {

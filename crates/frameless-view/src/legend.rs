@@ -4,8 +4,9 @@ use eframe::egui::{
     Align2, Color32, CornerRadius, FontId, Mesh, Painter, Pos2, Rect, Shape, pos2, vec2,
 };
 
-use crate::heatmap::{self, Scale};
-use crate::overlay::{Colours, Legend};
+use frameless_session::heatmap::{self, Scale};
+use frameless_session::{Colours, Legend};
+
 use crate::theme;
 
 const WIDTH: f32 = 280.0;

@@ -1,36 +1,19 @@
 //! The window in which a frameless picture is looked at.
 //!
-//! Two threads that never wait for each other: the render loop (`session`, in `render_thread`) owns the engine, takes
-//! commands, and hands out a finished picture per refresh; the window (`app`) draws that picture, the panel and what is
-//! known about the picture, and turns hands on mouse and keys into commands. A third reads scenes that the user opens.
-//!
-//! Nothing that can be set clears the picture: not the size, not the sampler, not another scene.
+//! Two threads that never wait for each other: the render loop (`frameless_session`) takes commands and hands out a finished
+//! picture per refresh; the window (`app`) draws that picture, the panel and what is known about the picture, and turns hands on
+//! mouse and keys into commands. A third reads scenes that the user opens.
 
 mod app;
-mod camera;
-mod command;
-mod heatmap;
 mod help;
 mod hud;
 mod legend;
-mod load;
 mod messages;
 mod navigation;
 mod no_display;
 mod options;
-mod overlay;
-mod pace;
 mod panel;
 mod picture;
-mod rate;
-mod render_thread;
-mod session;
-mod settings;
-mod shown;
-mod snapshot;
-mod stage;
-#[cfg(test)]
-mod test_stage;
 mod theme;
 mod timed;
 mod transport;
@@ -40,8 +23,8 @@ use std::sync::Arc;
 use eframe::egui::{ViewportBuilder, vec2};
 use frameless_trace::World;
 
+pub use frameless_session::{Overlay, PictureSize, Settings};
 pub use options::ViewOptions;
-pub use settings::{Overlay, PictureSize, Settings};
 
 /// Opens the window; returns when the user has closed it.
 ///

@@ -3,7 +3,7 @@
 use eframe::egui::{InputState, Key, PointerButton, Response, Vec2};
 use glam::Vec3;
 
-use crate::camera::FreeCamera;
+use frameless_session::FreeCamera;
 
 /// What the user's hands did since the last refresh.
 #[derive(Clone, Copy, Debug, PartialEq)]

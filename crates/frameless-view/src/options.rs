@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use frameless_scene::{Limits, Scene};
 
-use crate::Settings;
+use frameless_session::Settings;
 
 /// What the window is opened with.
 #[derive(Clone)]

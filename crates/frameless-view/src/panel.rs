@@ -8,7 +8,7 @@ use frameless::{
 };
 use frameless_scene::Scene;
 
-use crate::settings::{Overlay, PictureSize, Settings};
+use frameless_session::{Overlay, PictureSize, Settings};
 
 /// What the panel remembers that is no setting.
 pub(crate) struct PanelState {

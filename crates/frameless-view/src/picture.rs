@@ -8,7 +8,7 @@ use eframe::egui_wgpu::{Callback, CallbackResources, CallbackTrait, RenderState}
 use eframe::wgpu;
 use frameless::Size;
 
-use crate::command::Picture;
+use frameless_session::Picture;
 
 /// A texture of the picture's size, written once per refresh, and what draws it.
 pub(crate) struct PictureTexture {

@@ -6,8 +6,9 @@ use std::time::Duration;
 use eframe::egui::{ColorImage, Context, ViewportCommand};
 use frameless::Size;
 
-use crate::command::Status;
-use crate::{ViewOptions, snapshot};
+use frameless_session::{Status, snapshot};
+
+use crate::ViewOptions;
 
 pub(crate) struct Timed {
     screenshot_after: Option<(Duration, PathBuf)>,

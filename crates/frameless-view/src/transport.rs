@@ -2,7 +2,7 @@
 
 use eframe::egui::{Button, DragValue, Key, Slider, Ui, vec2};
 
-use crate::command::Command;
+use frameless_session::Command;
 
 /// What the bar shows.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -64,7 +64,7 @@ impl SamplingRate {
 /// A renderer whose answers can be counted per pixel, at a nanosecond or two per sample while somebody looks.
 pub(crate) struct Counted<T> {
     /// The renderer itself.
-    pub(crate) tracer: T,
+    pub tracer: T,
     rate: Option<SamplingRate>,
     // The next batch's number, and the first that shows the present scene.
     next: u64,

@@ -9,9 +9,9 @@ use crate::session::Stage;
 
 /// Every pixel is this grey, or every other column black; remembers where it is to look from.
 pub(crate) struct Plain {
-    pub(crate) grey: f32,
-    pub(crate) striped: bool,
-    pub(crate) view: ViewChoice,
+    pub grey: f32,
+    pub striped: bool,
+    pub view: ViewChoice,
     answers: VecDeque<Answer>,
 }
 

@@ -11,7 +11,7 @@ use crate::pace::Pace;
 use crate::session::{Session, Stage};
 
 /// A running loop. Ends when dropped.
-pub(crate) struct RenderThread<W> {
+pub struct RenderThread<W> {
     // Taken on drop: that the channel is closed is the sign to end.
     commands: Option<Sender<Command<W>>>,
     reports: Receiver<Report>,
@@ -20,14 +20,14 @@ pub(crate) struct RenderThread<W> {
 
 /// The loop has ended, which it does by itself only when the renderer panics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Ended;
+pub struct Ended;
 
 impl<W: Send + 'static> RenderThread<W> {
     /// Starts the loop. `wake` is called after every report.
     ///
     /// # Errors
     /// If the system has no thread left.
-    pub(crate) fn start<S: Stage<World = W> + Send + 'static>(
+    pub fn start<S: Stage<World = W> + Send + 'static>(
         session: Session<S>,
         wake: impl Fn() + Send + 'static,
     ) -> io::Result<RenderThread<W>> {
@@ -40,7 +40,7 @@ impl<W: Send + 'static> RenderThread<W> {
     }
 
     /// Ask for something. Lost if the loop has ended, which [`RenderThread::report`] says.
-    pub(crate) fn send(&self, command: Command<W>) {
+    pub fn send(&self, command: Command<W>) {
         if let Some(commands) = &self.commands {
             commands.send(command).ok();
         }
@@ -50,7 +50,7 @@ impl<W: Send + 'static> RenderThread<W> {
     ///
     /// # Errors
     /// If the loop has ended.
-    pub(crate) fn report(&self) -> Result<Option<Report>, Ended> {
+    pub fn report(&self) -> Result<Option<Report>, Ended> {
         match self.reports.try_recv() {
             Ok(report) => Ok(Some(report)),
             Err(TryRecvError::Empty) => Ok(None),
@@ -78,7 +78,7 @@ fn run<S: Stage>(
     reports: &Sender<Report>,
     wake: impl Fn(),
 ) {
-    let mut pace = Pace::new();
+    let mut pace = Pace::default();
     let mut wanted = None;
     let mut next_error = Time::ZERO;
     // Sending fails once the window is gone; then the channel of commands is closed, too.

@@ -19,13 +19,13 @@ fn of(canvas: &Canvas, display: Display) -> Of {
 
 /// How old the picture is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Ages {
+pub struct Ages {
     /// Mean over the pixels that show a sample, in seconds.
-    pub(crate) mean_secs: f64,
+    pub mean_secs: f64,
     /// The oldest of them, in seconds.
-    pub(crate) max_secs: f64,
+    pub max_secs: f64,
     /// Pixels of which nothing is known, see [`Canvas::known`].
-    pub(crate) unknown: usize,
+    pub unknown: usize,
 }
 
 impl Shown {

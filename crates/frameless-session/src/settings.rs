@@ -78,7 +78,7 @@ impl Overlay {
     }
 
     /// What it teaches, in a sentence or two.
-    pub(crate) fn explanation(self) -> &'static str {
+    pub fn explanation(self) -> &'static str {
         match self {
             Overlay::None => "what the samples look like together",
             Overlay::Change => {
@@ -131,7 +131,7 @@ impl PictureSize {
     pub const WHOLE_WINDOW: PictureSize = PictureSize::Window { at_most: 1920 * 1080 };
 
     /// The picture's size for a place of `place_px` physical pixels.
-    pub(crate) fn size_in(self, place_px: [u32; 2]) -> Size {
+    pub fn size_in(self, place_px: [u32; 2]) -> Size {
         let [width, height] = place_px.map(|side| side.max(SMALLEST_SIDE));
         match self {
             PictureSize::Fixed(size) => size,

@@ -10,11 +10,11 @@ use frameless_scene::{Limits, Scene, builtin};
 use frameless_trace::World;
 
 /// A scene being read and prepared in a thread of its own.
-pub(crate) struct Loading {
+pub struct Loading {
     /// What the user asked for.
-    pub(crate) name: String,
+    pub name: String,
     /// What is being done.
-    pub(crate) stage: &'static str,
+    pub stage: &'static str,
     progress: Receiver<Progress>,
 }
 
@@ -24,7 +24,7 @@ enum Progress {
 }
 
 /// How far it is.
-pub(crate) enum Outcome {
+pub enum Outcome {
     /// Not there yet.
     Running,
     /// Ready for the renderer; [`World::scene`] is what was read.
@@ -37,7 +37,7 @@ pub(crate) enum Outcome {
 ///
 /// # Errors
 /// With what is wrong with the file.
-pub(crate) fn open(name: &str, limits: &Limits) -> anyhow::Result<Scene> {
+pub fn open(name: &str, limits: &Limits) -> anyhow::Result<Scene> {
     match builtin(name) {
         Some(scene) => Ok(scene),
         None => Ok(frameless_scene::load(Path::new(name), limits)?),
@@ -49,7 +49,7 @@ impl Loading {
     ///
     /// # Errors
     /// If the system has no thread left.
-    pub(crate) fn start(
+    pub fn start(
         name: String,
         open: impl FnOnce(&str) -> anyhow::Result<Scene> + Send + 'static,
         wake: impl Fn() + Send + 'static,
@@ -70,7 +70,7 @@ impl Loading {
     }
 
     /// What has happened since the last call.
-    pub(crate) fn poll(&mut self) -> Outcome {
+    pub fn poll(&mut self) -> Outcome {
         loop {
             match self.progress.try_recv() {
                 Ok(Progress::Stage(stage)) => self.stage = stage,

@@ -8,16 +8,16 @@ use crate::settings::Overlay;
 
 /// How to read what is drawn.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Legend {
+pub struct Legend {
     /// What is shown; for numbers with their unit.
-    pub(crate) title: &'static str,
+    pub title: &'static str,
     /// What the colours mean.
-    pub(crate) colours: Colours,
+    pub colours: Colours,
 }
 
 /// What colours mean.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Colours {
+pub enum Colours {
     /// Numbers, in the colours of the heat map.
     Scale(Scale),
     /// Something else each.
@@ -26,7 +26,7 @@ pub(crate) enum Colours {
 
 /// An overlay, or why there is none.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Drawn {
+pub enum Drawn {
     /// The colours are in the picture.
     HeatMap(Legend),
     /// The sampler does not know such values; the picture itself is shown.

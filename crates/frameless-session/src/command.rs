@@ -9,7 +9,7 @@ use crate::shown::Ages;
 
 /// From the window to the render loop. `W` is a scene made ready for the renderer.
 #[derive(Debug)]
-pub(crate) enum Command<W> {
+pub enum Command<W> {
     /// Everything that the panel can set; what differs is applied. The picture stays.
     Settings(Settings),
     /// The picture's size in pixels. The picture stays, resampled.
@@ -35,7 +35,7 @@ pub(crate) enum Command<W> {
 
 /// From where the scene is looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum ViewChoice {
+pub enum ViewChoice {
     /// One of the scene's cameras, by index; moves if it is animated.
     Camera(u32),
     /// Where the user has put it.
@@ -44,7 +44,7 @@ pub(crate) enum ViewChoice {
 
 /// From the render loop to the window.
 #[derive(Debug)]
-pub(crate) enum Report {
+pub enum Report {
     /// A picture to be shown, with what the loop knows of itself.
     Picture(Picture),
     /// The renderer gave an answer that cannot be used; the loop goes on.
@@ -53,26 +53,26 @@ pub(crate) enum Report {
 
 /// The picture at one moment.
 #[derive(Debug)]
-pub(crate) struct Picture {
+pub struct Picture {
     /// Width and height.
-    pub(crate) size: Size,
+    pub size: Size,
     /// sRGB-encoded RGBA, row-major from the top.
-    pub(crate) rgba: Vec<[u8; 4]>,
+    pub rgba: Vec<[u8; 4]>,
     /// What the loop knows of itself.
-    pub(crate) status: Status,
+    pub status: Status,
 }
 
 /// What the loop knows of itself, at the moment of a picture.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Status {
+pub struct Status {
     /// Scene time in seconds.
-    pub(crate) scene_secs: f64,
+    pub scene_secs: f64,
     /// Samples kept per second, over the last quarter of a second.
-    pub(crate) samples_per_sec: f64,
+    pub samples_per_sec: f64,
     /// Pictures made per second, over the same time.
-    pub(crate) pictures_per_sec: f64,
+    pub pictures_per_sec: f64,
     /// How old the picture is.
-    pub(crate) ages: Ages,
+    pub ages: Ages,
     /// The overlay, where one was asked for.
-    pub(crate) overlay: Option<Drawn>,
+    pub overlay: Option<Drawn>,
 }

@@ -14,7 +14,7 @@ use crate::settings::{Overlay, Settings};
 use crate::shown::{self, Shown};
 
 /// A renderer that can be pointed at another scene or from another place.
-pub(crate) trait Stage: Tracer {
+pub trait Stage: Tracer {
     /// A scene made ready for this renderer, in another thread.
     type World: Send + 'static;
 
@@ -26,7 +26,7 @@ pub(crate) trait Stage: Tracer {
 }
 
 /// An engine with its settings.
-pub(crate) struct Session<S> {
+pub struct Session<S> {
     engine: Engine<Counted<S>>,
     settings: Settings,
     seed: u64,
@@ -37,7 +37,7 @@ pub(crate) struct Session<S> {
 
 impl<S: Stage> Session<S> {
     /// A black picture.
-    pub(crate) fn new(size: Size, clock: Clock, settings: Settings, seed: u64, stage: S) -> Self {
+    pub fn new(size: Size, clock: Clock, settings: Settings, seed: u64, stage: S) -> Self {
         let sampler = settings.sampler.build(seed);
         let mut engine = Engine::new(size, clock, sampler, Counted::new(stage));
         engine.set_budget(settings.samples_per_sec);
@@ -49,7 +49,7 @@ impl<S: Stage> Session<S> {
     }
 
     /// One turn of the loop.
-    pub(crate) fn step(&mut self) -> Result<usize, EngineError> {
+    pub fn step(&mut self) -> Result<usize, EngineError> {
         let outcome = self.engine.step();
         if self.settings.overlay == Overlay::Change {
             let size = self.engine.canvas().size();
@@ -59,12 +59,12 @@ impl<S: Stage> Session<S> {
     }
 
     /// The present time of the engine's clock.
-    pub(crate) fn now(&self) -> Time {
+    pub fn now(&self) -> Time {
         self.engine.now()
     }
 
     /// Does what the window asks for; a wish for a picture is for the caller to keep.
-    pub(crate) fn apply(&mut self, command: Command<S::World>) {
+    pub fn apply(&mut self, command: Command<S::World>) {
         let now = self.engine.now();
         match command {
             Command::Settings(settings) => self.set(settings),
@@ -125,13 +125,13 @@ impl<S: Stage> Session<S> {
 
     /// Whether there is more than the first few samples, or no hope of more soon. The first batches are tiny, until the clock
     /// knows the renderer; a picture of them would show nothing, cost as much as any, and put off the next.
-    pub(crate) fn is_worth_showing(&self) -> bool {
+    pub fn is_worth_showing(&self) -> bool {
         let enough = self.engine.canvas().size().pixels() as u64 / PIXELS_PER_FIRST_SAMPLE;
         self.engine.counters().kept >= enough || self.now() >= FIRST_PICTURE_AT_LATEST
     }
 
     /// The picture now, in reused memory.
-    pub(crate) fn picture(&mut self, memory: Vec<[u8; 4]>) -> Picture {
+    pub fn picture(&mut self, memory: Vec<[u8; 4]>) -> Picture {
         let now = self.engine.now();
         let mut rgba = memory;
         rgba.clear();

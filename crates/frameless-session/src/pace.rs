@@ -7,15 +7,9 @@
 
 use frameless::Time;
 
-/// What a software driver spends on a window of so many pixels, in seconds of all its threads: the toolkit's clock does
-/// not see them. Measured with lavapipe: 19 ms for 1280 × 800, panel and picture shown.
-pub(crate) fn software_paint_secs(window_px: f64) -> f64 {
-    19e-9 * window_px
-}
-
-/// Says when the next picture is due.
-#[derive(Clone, Debug)]
-pub(crate) struct Pace {
+/// Says when the next picture is due; the first one at once.
+#[derive(Clone, Debug, Default)]
+pub struct Pace {
     due: Time,
     paint_secs: f64,
 }
@@ -34,13 +28,8 @@ const LONGEST_REST_SECS: f64 = 1.0;
 const LEARNING_RATE: f64 = 0.1;
 
 impl Pace {
-    /// Due at once.
-    pub(crate) fn new() -> Pace {
-        Pace { due: Time::ZERO, paint_secs: 0.0 }
-    }
-
     /// Told what the window's last paint cost, in seconds without waiting for the display.
-    pub(crate) fn painted(&mut self, paint_secs: f64) {
+    pub fn painted(&mut self, paint_secs: f64) {
         if paint_secs.is_finite() {
             self.paint_secs += LEARNING_RATE * (paint_secs - self.paint_secs);
         }
@@ -48,14 +37,14 @@ impl Pace {
 
     /// Told when a picture is ready, and what making it cost in seconds of the render loop. The samples get their share before
     /// the next one: at once and not on average, since the first pictures of a large window cost most.
-    pub(crate) fn made(&mut self, now: Time, refresh_secs: f64) {
+    pub fn made(&mut self, now: Time, refresh_secs: f64) {
         let rest_secs = refresh_secs * (1.0 / REFRESH_SHARE - 1.0);
         let rested = Time::from_secs(now.secs() + rest_secs.min(LONGEST_REST_SECS));
         self.due = self.due.max(rested);
     }
 
     /// Whether a picture is due; if so, the next one is due an interval later.
-    pub(crate) fn is_due(&mut self, now: Time) -> bool {
+    pub fn is_due(&mut self, now: Time) -> bool {
         if now < self.due {
             return false;
         }
@@ -65,7 +54,7 @@ impl Pace {
     }
 
     /// Seconds between two pictures, as far as painting goes.
-    pub(crate) fn interval_secs(&self) -> f64 {
+    pub fn interval_secs(&self) -> f64 {
         (self.paint_secs / PAINT_SHARE).clamp(SHORTEST_SECS, LONGEST_SECS)
     }
 }
@@ -80,14 +69,14 @@ mod tests {
 
     #[test]
     fn cheap_painting_goes_at_the_displays_rate() {
-        let mut pace = Pace::new();
+        let mut pace = Pace::default();
         pace.painted(0.001);
         assert!((60..=67).contains(&due_in_a_second(&mut pace)));
     }
 
     #[test]
     fn dear_painting_goes_at_a_quarter_of_a_core() {
-        let mut pace = Pace::new();
+        let mut pace = Pace::default();
         (0..100).for_each(|_| pace.painted(0.01));
         let painted = due_in_a_second(&mut pace);
         assert!((24..=26).contains(&painted), "{painted} × 10 ms");
@@ -100,7 +89,7 @@ mod tests {
     #[test]
     fn dear_refreshes_leave_the_samples_two_thirds_of_the_loop() {
         let made_in_a_second = |refresh_ms: u64| {
-            let (mut pace, mut now, mut made) = (Pace::new(), Time::from_secs(1.0), 0);
+            let (mut pace, mut now, mut made) = (Pace::default(), Time::from_secs(1.0), 0);
             while now < Time::from_secs(2.0) {
                 now.0 += 1_000_000;
                 if pace.is_due(now) {
@@ -115,7 +104,7 @@ mod tests {
         assert!((11..=12).contains(&made_in_a_second(30)));
         // The very first already.
         assert_eq!(made_in_a_second(300), 2);
-        let mut pace = Pace::new();
+        let mut pace = Pace::default();
         pace.made(Time::ZERO, 60.0);
         assert!(pace.is_due(Time::from_secs(LONGEST_REST_SECS)));
     }

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 /// Which values the colours stand for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Scale {
+pub enum Scale {
     /// From 0 (darkest) to `high` (brightest), evenly.
     Linear {
         /// Positive.
@@ -21,7 +21,7 @@ pub(crate) enum Scale {
 
 impl Scale {
     /// Where a value lies between darkest and brightest, in [0, 1]; what lies outside is clamped, NaN is 0.
-    pub(crate) fn position(&self, value: f32) -> f32 {
+    pub fn position(&self, value: f32) -> f32 {
         let position = match *self {
             Scale::Linear { high } => value / high,
             Scale::Logarithmic { low, .. } if value <= low => 0.0,
@@ -31,7 +31,7 @@ impl Scale {
     }
 
     /// Values worth a tick, with their position in [0, 1], from dark to bright.
-    pub(crate) fn ticks(&self) -> Vec<(f32, f32)> {
+    pub fn ticks(&self) -> Vec<(f32, f32)> {
         match *self {
             // Quarters of 1, 2 or 5 times a power of ten have at most three digits.
             Scale::Linear { high } => {
@@ -47,7 +47,7 @@ impl Scale {
 
     /// A linear scale for values up to about `largest`: its end is 1, 2 or 5 times a power of ten, so that it
     /// stays the same while the values flicker. Without any positive value it ends at 1.
-    pub(crate) fn linear_up_to(largest: f32) -> Scale {
+    pub fn linear_up_to(largest: f32) -> Scale {
         if !(largest.is_finite() && largest > 0.0) {
             return Scale::Linear { high: 1.0 };
         }
@@ -61,7 +61,7 @@ impl Scale {
 
 /// The value that about 99 % of `values` do not exceed, from every 61st of them: a few extreme pixels must not
 /// darken all others. 0 if there are none.
-pub(crate) fn typical_largest(values: impl ExactSizeIterator<Item = f32>) -> f32 {
+pub fn typical_largest(values: impl ExactSizeIterator<Item = f32>) -> f32 {
     // Prime, so that it visits all columns of pictures whose width is a multiple of a tile's.
     const STRIDE: usize = 61;
     let stride = if values.len() > 64 * STRIDE { STRIDE } else { 1 };
@@ -83,7 +83,7 @@ static INFERNO: LazyLock<[[u8; 4]; STEPS]> = LazyLock::new(|| {
 });
 
 /// sRGB colour with alpha 255 of a position in [0, 1].
-pub(crate) fn colour(position: f32) -> [u8; 4] {
+pub fn colour(position: f32) -> [u8; 4] {
     INFERNO[((position * (STEPS - 1) as f32 + 0.5) as usize).min(STEPS - 1)]
 }
 

@@ -8,7 +8,7 @@ use glam::{Affine3A, Quat, Vec3};
 
 /// A camera that looks at `target` from `distance`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct FreeCamera {
+pub struct FreeCamera {
     /// World from camera: looks along −z, +y is up. Unit quaternion.
     rotation: Quat,
     /// What orbiting turns around, in metres.
@@ -28,7 +28,7 @@ impl FreeCamera {
     /// The camera that sees what `view` sees, and turns around the point of its axis nearest to `focus`.
     ///
     /// Where `focus` lies behind the camera (or the numbers are not finite) it turns around a point one metre ahead.
-    pub(crate) fn from_view(view: &View, focus: Vec3) -> FreeCamera {
+    pub fn from_view(view: &View, focus: Vec3) -> FreeCamera {
         let rotation = Quat::from_mat3a(&view.world_from_camera.matrix3).normalize();
         let eye = Vec3::from(view.world_from_camera.translation);
         let ahead = (focus - eye).dot(rotation * Vec3::NEG_Z);
@@ -38,7 +38,7 @@ impl FreeCamera {
     }
 
     /// Where it stands and how it projects.
-    pub(crate) fn view(&self) -> View {
+    pub fn view(&self) -> View {
         let eye = self.target - self.distance * self.forward();
         View {
             world_from_camera: Affine3A::from_rotation_translation(self.rotation, eye),
@@ -48,7 +48,7 @@ impl FreeCamera {
 
     /// Turn around the target: `yaw_rad` around the world's y axis (positive: the camera moves to its right),
     /// then `pitch_rad` around the camera's own x axis (positive: it climbs). Keeps target and distance.
-    pub(crate) fn orbit(&mut self, yaw_rad: f32, pitch_rad: f32) {
+    pub fn orbit(&mut self, yaw_rad: f32, pitch_rad: f32) {
         let elevation = (self.rotation * Vec3::Z).y.clamp(-1.0, 1.0).asin();
         // A camera that starts nearer to the pole (a view straight down) may stay, but not go further.
         let limit = STEEPEST_RAD.max(elevation.abs());
@@ -60,14 +60,14 @@ impl FreeCamera {
 
     /// Move camera and target in the picture plane so that what lies at the target's depth follows a pointer that
     /// moved by `delta_px` (x right, y down) in a picture `height_px` high.
-    pub(crate) fn pan(&mut self, delta_px: [f32; 2], height_px: f32) {
+    pub fn pan(&mut self, delta_px: [f32; 2], height_px: f32) {
         let metres_per_px = self.visible_height() / height_px.max(1.0);
         let in_plane = Vec3::new(-delta_px[0], delta_px[1], 0.0) * metres_per_px;
         self.target += self.rotation * in_plane;
     }
 
     /// Multiply the distance by `factor` (below 1: nearer); an orthographic view narrows instead.
-    pub(crate) fn zoom(&mut self, factor: f32) {
+    pub fn zoom(&mut self, factor: f32) {
         match &mut self.projection {
             Projection::Perspective { .. } => self.distance = within_reach(self.distance * factor),
             Projection::Orthographic { ymag } => *ymag = within_reach(*ymag * factor),
@@ -76,7 +76,7 @@ impl FreeCamera {
 
     /// Move camera and target by `steps` in the camera's own axes (right, up, backward), in units of the distance
     /// to the target: near things are approached slowly.
-    pub(crate) fn fly(&mut self, steps: Vec3) {
+    pub fn fly(&mut self, steps: Vec3) {
         self.target += self.rotation * (steps * self.distance);
     }
 

@@ -13,7 +13,7 @@ use image::{ExtendedColorType, ImageEncoder};
 ///
 /// # Errors
 /// If the picture cannot be encoded or the file not be written; then there is no file.
-pub(crate) fn save_numbered(
+pub fn save_numbered(
     folder: &Path,
     scene: &str,
     size: Size,
@@ -39,7 +39,7 @@ const MOST: u32 = 9999;
 ///
 /// # Errors
 /// If the picture cannot be encoded or the file not be written.
-pub(crate) fn save(path: &Path, size: Size, rgba: &[[u8; 4]]) -> anyhow::Result<()> {
+pub fn save(path: &Path, size: Size, rgba: &[[u8; 4]]) -> anyhow::Result<()> {
     let png = encode(size, rgba)?;
     std::fs::write(path, png)
         .map_err(|error| anyhow::anyhow!("cannot write {}: {error}", path.display()))
