@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Parser, Subcommand};
 use frameless::{ReconstructionKind, Size};
+use frameless_scene::{AnimationChoice, Pick};
 use frameless_trace::{Integrator, Settings};
 
 use crate::failure::Failure;
@@ -64,6 +65,7 @@ pub(crate) enum Command {
 #[command(after_help = "Examples:
   frameless view
   frameless view model.glb --rate 900000 --temporal 0.8
+  frameless view fox.glb --animation Run
   frameless view sphere --sampler change --reconstruction hold
       the algorithm of 2002
   frameless view sphere --size 512x384 --screenshot shot.png --after 3")]
@@ -71,6 +73,9 @@ pub(crate) struct ViewArgs {
     /// A glTF file or a built-in scene
     #[arg(default_value = DEFAULT_SCENE)]
     pub(crate) scene: String,
+
+    #[command(flatten)]
+    pub(crate) choice: ChoiceArgs,
 
     /// Who chooses the pixels [default: adaptive]
     ///
@@ -133,6 +138,19 @@ pub(crate) struct ViewArgs {
     pub(crate) after: f64,
 }
 
+/// Which part of a glTF file.
+#[derive(ClapArgs, Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct ChoiceArgs {
+    /// Show this of the file's scenes: a number from 0, or a name [default: the one that the file names, else its first]
+    #[arg(long = "scene", value_name = "N|NAME")]
+    pub(crate) file_scene: Option<Pick>,
+
+    /// Play this of the file's animations: a number from 0, a name, all or none [default: all at once; the first alone if two
+    /// of them move the same thing]
+    #[arg(long, value_name = "N|NAME|all|none")]
+    pub(crate) animation: Option<AnimationChoice>,
+}
+
 /// The scene of `frameless` without arguments.
 const DEFAULT_SCENE: &str = "sphere";
 
@@ -141,6 +159,7 @@ impl Default for ViewArgs {
     fn default() -> ViewArgs {
         ViewArgs {
             scene: DEFAULT_SCENE.into(),
+            choice: ChoiceArgs::default(),
             sampler: None,
             reconstruction: None,
             temporal: None,
@@ -199,6 +218,9 @@ pub(crate) struct CompareArgs {
 pub(crate) struct RenderArgs {
     /// A glTF file or a built-in scene
     pub(crate) scene: String,
+
+    #[command(flatten)]
+    pub(crate) choice: ChoiceArgs,
 
     /// The moment, in seconds of the scene's own time
     #[arg(long, value_name = "SECS", default_value = "0", value_parser = parse::finite)]
@@ -273,6 +295,9 @@ pub(crate) struct TraceArgs {
     /// A glTF file or a built-in scene
     pub(crate) scene: String,
 
+    #[command(flatten)]
+    pub(crate) choice: ChoiceArgs,
+
     /// Column and row, counted from the top left
     #[arg(long, value_name = "X,Y", value_parser = parse::pixel)]
     pub(crate) pixel: (u32, u32),
@@ -295,10 +320,14 @@ pub(crate) struct TraceArgs {
 #[derive(ClapArgs)]
 #[command(after_help = "Examples:
   frameless info sphere
-  frameless info model.glb")]
+  frameless info model.glb
+      the names of its scenes and animations are what --scene and --animation take")]
 pub(crate) struct InfoArgs {
     /// A glTF file or a built-in scene
     pub(crate) scene: String,
+
+    #[command(flatten)]
+    pub(crate) choice: ChoiceArgs,
 }
 
 fn sampler_names() -> clap::builder::PossibleValuesParser {
@@ -327,6 +356,7 @@ mod tests {
             (typed.scene, typed.sampler, typed.size, typed.rate, typed.camera),
             (default.scene, default.sampler, default.size, default.rate, default.camera)
         );
+        assert_eq!(typed.choice, default.choice);
         assert_eq!(
             (typed.reconstruction, typed.temporal),
             (default.reconstruction, default.temporal)
@@ -356,6 +386,10 @@ pub(crate) struct BenchArgs {
     #[arg(long)]
     scene: Option<String>,
 
+    /// Which of the file's animations are played, as for `view`
+    #[arg(long, value_name = "N|NAME|all|none")]
+    animation: Option<AnimationChoice>,
+
     /// Size of the picture in pixels
     #[arg(long, value_name = "WxH", default_value = "512x384", value_parser = parse::size)]
     pub(crate) size: Size,
@@ -381,6 +415,11 @@ impl BenchArgs {
     /// What is traced.
     pub(crate) fn scene(&self) -> &str {
         self.scene.as_deref().unwrap_or(DEFAULT_SCENE)
+    }
+
+    /// What of it moves.
+    pub(crate) fn choice(&self) -> ChoiceArgs {
+        ChoiceArgs { file_scene: None, animation: self.animation.clone() }
     }
 
     /// For benchmarks whose scenes are fixed.

@@ -21,7 +21,7 @@ pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
         output::check_png_path(screenshot)?;
     }
     let settings = settings(args)?;
-    let mut scene = input::scene(&args.scene)?;
+    let mut scene = input::scene(&args.scene, &args.choice)?;
     let first = input::camera(&scene, args.camera)?;
     // The window begins with the first camera.
     scene.cameras.rotate_left(first as usize);

@@ -54,6 +54,9 @@ impl Emitters {
             let Geometry::Mesh(mesh) = &scene.geometries[placed.geometry as usize] else {
                 continue;
             };
+            if scene.deformation_of(instance).is_some() {
+                continue;
+            }
             let radiance = |primitive: usize| {
                 let material = mesh.triangle_materials.get(primitive);
                 let material = material.and_then(|&index| scene.materials.get(index as usize));

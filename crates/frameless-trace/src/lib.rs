@@ -9,6 +9,7 @@ mod bsdf;
 mod build;
 mod camera;
 mod cpu;
+mod deforming;
 mod direct;
 mod emitters;
 mod explain;
@@ -23,6 +24,7 @@ mod path;
 mod planes;
 mod point;
 mod ray;
+mod refit;
 mod render;
 mod sphere;
 mod texture;
@@ -31,6 +33,8 @@ mod traverse;
 mod wide;
 mod world;
 
+#[cfg(test)]
+mod bending;
 #[cfg(test)]
 mod light_transport;
 #[cfg(test)]
