@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, Parser, Subcommand};
 use frameless::{ReconstructionKind, Size};
 use frameless_scene::{AnimationChoice, Pick};
+use frameless_trace::{Integrator, Settings};
 
 use crate::failure::Failure;
 use crate::parse;
@@ -116,6 +117,9 @@ pub(crate) struct ViewArgs {
     #[arg(allow_negative_numbers = true)]
     pub(crate) exposure: f32,
 
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
+
     /// Trace with so many threads; 0: one per core
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) threads: usize,
@@ -163,6 +167,7 @@ impl Default for ViewArgs {
             rate: None,
             camera: 0,
             exposure: 0.0,
+            light: LightArgs::default(),
             threads: 0,
             seed: 1,
             screenshot: None,
@@ -238,6 +243,48 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "STOPS", default_value = "0", value_parser = parse::stops)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) exposure: f32,
+
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
+
+    /// Samples per pixel: one at its centre, or so many spread over it
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    pub(crate) samples: u32,
+}
+
+/// How light is followed.
+#[derive(ClapArgs)]
+pub(crate) struct LightArgs {
+    /// How light is followed
+    ///
+    /// direct: lights seen directly and in mirrors, with hard shadows; without noise. path: light that has bounced any number of
+    /// times, by random paths; noise goes away where the picture rests.
+    #[arg(long, value_name = "NAME", default_value = "direct", value_parser = integrator_names())]
+    pub(crate) integrator: String,
+
+    /// After how many surfaces a path of light ends
+    #[arg(long, value_name = "N", default_value_t = Settings::default().max_depth)]
+    #[arg(value_parser = clap::value_parser!(u32).range(0..=1000))]
+    pub(crate) max_depth: u32,
+}
+
+impl Default for LightArgs {
+    fn default() -> LightArgs {
+        let Settings { integrator, max_depth, .. } = Settings::default();
+        LightArgs { integrator: integrator.name().to_owned(), max_depth }
+    }
+}
+
+impl LightArgs {
+    pub(crate) fn settings(&self) -> Settings {
+        let integrator = Integrator::from_name(&self.integrator).unwrap_or_default();
+        Settings { integrator, max_depth: self.max_depth, ..Settings::default() }
+    }
+}
+
+fn integrator_names() -> clap::builder::PossibleValuesParser {
+    clap::builder::PossibleValuesParser::new(Integrator::ALL.map(Integrator::name))
 }
 
 /// Trace one pixel and tell every step: the ray, what it hit, each light, the colour

@@ -27,6 +27,7 @@ pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
     scene.cameras.rotate_left(first as usize);
     let mut options = ViewOptions::new(Arc::new(scene));
     options.settings = settings;
+    options.tracing = args.light.settings();
     options.threads = args.threads;
     options.seed = args.seed;
     let Some(screenshot) = &args.screenshot else { return Ok(frameless_view::run(options)?) };

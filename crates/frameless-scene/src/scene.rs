@@ -135,6 +135,9 @@ pub struct Material {
     pub metallic: f32,
     /// 0: mirror, 1: matte.
     pub roughness: f32,
+    /// How strongly a dielectric reflects, from 0 (not at all) to 1 (as glass does); the factor of KHR_materials_specular. Metals do
+    /// not know it.
+    pub specular: f32,
     /// Linear RGB radiance given off.
     pub emissive: Vec3,
     /// Whether back faces are seen.
@@ -151,6 +154,7 @@ impl Default for Material {
             base_color_texture: None,
             metallic: 0.0,
             roughness: 1.0,
+            specular: 1.0,
             emissive: Vec3::ZERO,
             double_sided: false,
         }

@@ -1,5 +1,6 @@
 //! The point that a ray hit: where it is, which way it faces, what it is made of.
 
+use frameless::Surface;
 use frameless_scene::{Deformed, Geometry, Material, Mesh};
 use glam::{Vec2, Vec3A, Vec4};
 
@@ -53,6 +54,19 @@ struct Local {
 }
 
 impl Point {
+    /// What a sample says of the point; `per_albedo`: the direct light that a white surface would send back.
+    pub(crate) fn surface(&self, hit: &Hit, albedo: Vec3A, per_albedo: Vec3A, lit: u32) -> Surface {
+        Surface {
+            object: hit.instance,
+            primitive: hit.primitive,
+            position: self.anchor.to_array(),
+            normal: self.local_normal.to_array(),
+            albedo: albedo.to_array(),
+            direct: (albedo * per_albedo).to_array(),
+            lit,
+        }
+    }
+
     #[inline]
     pub(crate) fn new(world: &World, moment: &Moment, ray: &Ray, hit: &Hit) -> Point {
         let scene = world.scene();

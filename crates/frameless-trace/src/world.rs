@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use crate::build::Blas;
 use crate::deforming::Deforming;
+use crate::emitters::Emitters;
 use crate::images::Mirrors;
 use crate::kernel::Isa;
 use crate::texture::linear_from_srgb_table;
@@ -21,6 +22,7 @@ pub struct World {
     pub(crate) deforming: Vec<Deforming>,
     pub(crate) linear_from_srgb: [f32; 256],
     pub(crate) mirrors: Mirrors,
+    pub(crate) emitters: Emitters,
     pub(crate) isa: Isa,
     /// Tells the moments of this world from those of others.
     pub(crate) id: u64,
@@ -44,6 +46,7 @@ impl World {
             blas: blas.collect(),
             deforming: Deforming::all(&scene),
             mirrors: Mirrors::new(&scene),
+            emitters: Emitters::new(&scene),
             scene,
             linear_from_srgb: linear_from_srgb_table(),
             isa,
