@@ -127,6 +127,7 @@ connection.onLost = (reason) => {
   state = null;
   showDriver();
   byId("controls").disabled = true;
+  transport.stop();
   show("lost", "connection lost");
   byId("banner-text").textContent = `Connection lost${reason ? ` (${reason})` : ""}. Trying again …`;
   findOutWhy();
@@ -180,7 +181,7 @@ function showDriver() {
   byId("driver-text").textContent = state === null ? "not connected" : whoDrives(mine, others);
   const button = byId("drive");
   button.disabled = state === null;
-  button.hidden = mine && others === 0;
+  button.hidden = state === null || (mine && others === 0);
   button.textContent = mine ? "Release" : "Take the controls";
   button.classList.toggle("primary", !mine);
 }

@@ -46,7 +46,7 @@ export class Panel {
       return Object.assign(option(name, name), { title: description });
     }));
     byId("overlays").replaceChildren(...overlays.map(overlayChoice));
-    const first = option("", "built-in …");
+    const first = option("", "scene …");
     byId("scenes").replaceChildren(first, ...scenes.map(({ name, description }) => {
       return Object.assign(option(name, name), { title: description });
     }));
@@ -173,7 +173,7 @@ function showSize(picture) {
 function overlayChoice({ name, title, description }, digit) {
   const label = Object.assign(document.createElement("label"), { title: description });
   const radio = Object.assign(document.createElement("input"), { type: "radio", name: "overlay", value: name });
-  const text = Object.assign(document.createElement("span"), { textContent: title });
+  const text = Object.assign(document.createElement("span"), { textContent: title ?? name });
   const key = Object.assign(document.createElement("kbd"), { textContent: digit });
   key.setAttribute("aria-hidden", "true");
   label.append(radio, key, text);

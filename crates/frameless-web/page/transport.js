@@ -47,6 +47,12 @@ export class Transport {
     for (const id of ["play", "scrub", "speed"]) byId(id).disabled = !drives;
   }
 
+  /** Nobody knows how time goes on. */
+  stop() {
+    this.#told = { ...this.#told, moves: false };
+    for (const id of ["play", "scrub", "speed"]) byId(id).disabled = true;
+  }
+
   /** The scene's time, as the server has it now. */
   told(secs, moves) {
     this.#told = { secs, at: performance.now(), moves };
