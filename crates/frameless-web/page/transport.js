@@ -22,6 +22,7 @@ export class Transport {
     byId("play").addEventListener("click", () => this.toggle());
     byId("scrub").addEventListener("input", () => this.#scrubbed());
     byId("speed").addEventListener("change", () => this.#hurry());
+    byId("speed").addEventListener("keydown", ({ key }) => key === "Enter" && byId("speed").blur());
     const calm = matchMedia("(prefers-reduced-motion: reduce)");
     setInterval(() => !calm.matches && this.#tick(), TICK_MS);
   }

@@ -163,8 +163,13 @@ class View:
 
 # What the page tells of what it draws, counted from its beginning.
 LISTEN = """
-window.seen = { drawn: 0, last: 0, latencies: [] };
-document.addEventListener("frameless:drawn", () => { seen.drawn++; seen.last = performance.now(); });
+window.seen = { drawn: 0, last: 0, pictures: 0, picture: 0, latencies: [] };
+document.addEventListener("frameless:drawn", ({ detail }) => {
+  seen.drawn++;
+  seen.last = performance.now();
+  if (detail.picture !== seen.picture) seen.pictures++;
+  seen.picture = detail.picture;
+});
 document.addEventListener("frameless:latency", (event) => seen.latencies.push(event.detail));
 """
 
