@@ -65,7 +65,7 @@ function sendSize() {
   clearTimeout(sizeLater);
   sizeLater = setTimeout(() => {
     const wanted = layout.place.map((side) => Math.min(side, 16384));
-    if (!drives() || askedSize === wanted.join()) return;
+    if (askedSize === wanted.join()) return;
     if (connection.send({ type: "size", place: wanted })) askedSize = wanted.join();
   }, askedSize === "" ? 0 : 150);
 }
@@ -91,6 +91,7 @@ const heard = {
     upload.limit = { bytes: message.upload_bytes, client };
     panel.offer(message);
     show("live", "live");
+    sendSize();
   },
 
   scene(message) {
@@ -103,14 +104,11 @@ const heard = {
   },
 
   state(message) {
-    const drove = drives();
     state = message;
-    if (drives() && !drove) askedSize = "";
     panel.show(message, drives());
     transport.state(message, drives());
     showDriver();
     showLoading(message.loading);
-    sendSize();
   },
 
   legend: (message) => hud.showLegend(message),

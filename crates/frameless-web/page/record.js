@@ -1,22 +1,16 @@
-// A video of what the page shows: H.264 in MP4 where the browser can, WebM where it cannot.
+// A video of the picture, H.264 in MP4: made by the browser where it can, and by the server where it cannot.
 
 import { download } from "./save.js";
 
-// The first that the browser offers. The first two are H.264 and play everywhere.
-const KINDS = ["video/mp4;codecs=avc1.640028", "video/mp4;codecs=avc1.42E01F", "video/webm;codecs=vp9", "video/webm"];
-// At rest a canvas is not drawn to, but a video must go on.
-const PICTURES_PER_SEC = 30;
-// A tenth of a bit per pixel looks clean with H.264; small pictures need more for their edges.
-const BITS_PER_PIXEL = 0.2;
-const BITS_PER_SEC = [2e6, 40e6];
+const KINDS = ["video/mp4;codecs=avc1.640028", "video/mp4;codecs=avc1.42E01F"];
 // In memory until it is downloaded; more than an hour at the usual rates.
 const MOST_BYTES = 2 ** 30;
 
 export class Recorder {
-  #source;
-  #recorder = null;
-  #paint = null;
+  #canvas;
+  #film = null;
   #begun = 0;
+  #clock = null;
   /** Called with {recording, secs} when that changes. */
   onChange = () => {};
   /** Called with (level, text). */
@@ -24,77 +18,136 @@ export class Recorder {
   /** Whose name the file bears. */
   scene = "picture";
 
-  constructor(source) {
-    this.#source = source;
-  }
-
-  get running() {
-    return this.#recorder !== null;
+  constructor(canvas) {
+    this.#canvas = canvas;
   }
 
   toggle() {
-    if (this.running) this.#recorder.stop();
+    if (this.#film) this.#film.stop();
     else this.#begin();
   }
 
-  #begin() {
-    const mimeType = KINDS.find((kind) => globalThis.MediaRecorder?.isTypeSupported(kind));
-    if (!mimeType) {
-      this.onNotice("error", "this browser records no video");
-      return;
+  async #begin() {
+    const kind = KINDS.find((kind) => globalThis.MediaRecorder?.isTypeSupported(kind));
+    const film = kind ? new OwnFilm(this.#canvas, kind) : new ServersFilm();
+    this.#film = film;
+    this.#begun = performance.now();
+    this.#tell();
+    this.#clock = setInterval(() => this.#tell(), 500);
+    try {
+      this.#save(await film.whole());
+    } catch (error) {
+      this.onNotice("error", `the recording broke off: ${error.message}`);
+    } finally {
+      clearInterval(this.#clock);
+      this.#film = null;
+      this.onChange({ recording: false, secs: 0 });
     }
-    const stream = this.#copied();
-    const { width, height } = this.#source;
-    const bits = width * height * PICTURES_PER_SEC * BITS_PER_PIXEL;
+  }
+
+  #tell() {
+    this.onChange({ recording: true, secs: (performance.now() - this.#begun) / 1000 });
+  }
+
+  #save(parts) {
+    const video = new Blob(parts, { type: "video/mp4" });
+    if (video.size === 0) return;
+    const name = download(video, this.scene, "mp4");
+    this.onNotice("info", `recorded ${name}, ${(video.size / 1e6).toFixed(1)} MB`);
+  }
+}
+
+// At rest a canvas is not drawn to, but a video must go on.
+const PICTURES_PER_SEC = 30;
+// A tenth of a bit per pixel looks clean with H.264; small pictures need more for their edges.
+const BITS_PER_PIXEL = 0.2;
+const BITS_PER_SEC = [2e6, 40e6];
+
+/** Of this page's canvas, by the browser's own encoder. */
+class OwnFilm {
+  #recorder;
+  #whole;
+
+  constructor(source, mimeType) {
+    const copy = evenCanvas(source);
+    const draw = () => drawInto(copy, source);
+    draw();
+    const painting = setInterval(draw, 1000 / PICTURES_PER_SEC);
+    const stream = copy.canvas.captureStream(PICTURES_PER_SEC);
+    const bits = source.width * source.height * PICTURES_PER_SEC * BITS_PER_PIXEL;
     const videoBitsPerSecond = Math.min(BITS_PER_SEC[1], Math.max(BITS_PER_SEC[0], bits));
     this.#recorder = new MediaRecorder(stream, { mimeType, videoBitsPerSecond });
-    this.#collect(stream, mimeType.split(";")[0]);
-    this.#begun = performance.now();
-    this.#recorder.start(1000);
-    this.onChange({ recording: true, secs: 0 });
-    if (!mimeType.startsWith("video/mp4")) this.onNotice("info", "this browser records no MP4: the video will be WebM");
-  }
-
-  /** The picture on a canvas of its own, whose size is even and stays, as H.264 wants it. */
-  #copied() {
-    const even = (side) => Math.max(2, side - (side % 2));
-    const copy = Object.assign(document.createElement("canvas"), {
-      width: even(this.#source.width),
-      height: even(this.#source.height),
+    this.#whole = this.#collect().finally(() => {
+      clearInterval(painting);
+      for (const track of stream.getTracks()) track.stop();
     });
-    const context = copy.getContext("2d", { alpha: false });
-    const draw = () => {
-      // Pixel by pixel, unless the picture has changed its size meanwhile.
-      const { width, height } = this.#source;
-      const scale = width - copy.width <= 1 && height - copy.height <= 1 && width >= copy.width && height >= copy.height
-        ? 1
-        : Math.min(copy.width / width, copy.height / height);
-      context.fillRect(0, 0, copy.width, copy.height);
-      context.drawImage(this.#source, 0, 0, width * scale, height * scale);
-      this.onChange({ recording: this.running, secs: (performance.now() - this.#begun) / 1000 });
-    };
-    draw();
-    this.#paint = setInterval(draw, 1000 / PICTURES_PER_SEC);
-    return copy.captureStream(PICTURES_PER_SEC);
+    this.#recorder.start(1000);
   }
 
-  #collect(stream, type) {
+  #collect() {
+    const recorder = this.#recorder;
     const parts = [];
     let bytes = 0;
-    this.#recorder.ondataavailable = ({ data }) => {
+    recorder.ondataavailable = ({ data }) => {
       parts.push(data);
       bytes += data.size;
-      if (bytes > MOST_BYTES && this.#recorder?.state === "recording") this.#recorder.stop();
+      if (bytes > MOST_BYTES) this.stop();
     };
-    this.#recorder.onerror = ({ error }) => this.onNotice("error", `the recording broke off: ${error?.message ?? "unknown"}`);
-    this.#recorder.onstop = () => {
-      clearInterval(this.#paint);
-      for (const track of stream.getTracks()) track.stop();
-      this.#recorder = null;
-      this.onChange({ recording: false, secs: 0 });
-      if (bytes === 0) return;
-      const name = download(new Blob(parts, { type }), this.scene, type.split("/")[1]);
-      this.onNotice("info", `recorded ${name}, ${(bytes / 1e6).toFixed(1)} MB`);
-    };
+    return new Promise((done, failed) => {
+      recorder.onstop = () => done(parts);
+      recorder.onerror = ({ error }) => failed(error ?? new Error("the browser does not say why"));
+    });
+  }
+
+  stop() {
+    if (this.#recorder.state !== "inactive") this.#recorder.stop();
+  }
+
+  /** Its parts, once it has been stopped. */
+  whole() {
+    return this.#whole;
+  }
+}
+
+/** A canvas whose size is even, as H.264 wants it, and stays. */
+function evenCanvas({ width, height }) {
+  const even = (side) => Math.max(2, side - (side % 2));
+  const canvas = Object.assign(document.createElement("canvas"), { width: even(width), height: even(height) });
+  return canvas.getContext("2d", { alpha: false });
+}
+
+/** Pixel by pixel; whole and smaller or larger if the picture has changed its size meanwhile. */
+function drawInto(context, source) {
+  const { width, height } = context.canvas;
+  const spare = [source.width - width, source.height - height];
+  const fits = spare.every((pixels) => pixels === 0 || pixels === 1);
+  const scale = fits ? 1 : Math.min(width / source.width, height / source.height);
+  context.fillRect(0, 0, width, height);
+  context.drawImage(source, 0, 0, source.width * scale, source.height * scale);
+}
+
+/** Of the server's pictures, by the server's encoder; it sends the file while that grows. */
+class ServersFilm {
+  #stopped = false;
+
+  stop() {
+    this.#stopped = true;
+  }
+
+  async whole() {
+    const answer = await fetch("recording.mp4", { cache: "no-store" });
+    if (!answer.ok) throw new Error((await answer.text()).trim() || `the server answers ${answer.status}`);
+    const reader = answer.body.getReader();
+    const parts = [];
+    for (let bytes = 0; bytes < MOST_BYTES; ) {
+      const { done, value } = await reader.read();
+      if (done) break; // the picture has another size now
+      parts.push(value);
+      bytes += value.byteLength;
+      // What came after the end was asked for is the piece with the end in it.
+      if (this.#stopped) break;
+    }
+    await reader.cancel();
+    return parts;
   }
 }
