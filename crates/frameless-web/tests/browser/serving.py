@@ -7,6 +7,7 @@ import signal
 import subprocess
 import tempfile
 import threading
+import time
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -92,6 +93,8 @@ class View:
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.add_init_script(LISTEN)
         self.page.goto(url)
+        # The address with the secret leads on to one without.
+        self.page.wait_for_url(lambda now: "key=" not in now)
 
     def _console(self, message) -> None:
         if message.type in ("error", "warning"):
@@ -103,9 +106,12 @@ class View:
     def __exit__(self, *_) -> None:
         self.context.close()
 
-    def wait(self, condition: str, timeout_secs: float = 15.0):
-        """Until a JavaScript expression is true."""
-        self.page.wait_for_function(condition, timeout=1000 * timeout_secs, polling=20)
+    def wait(self, condition: str, timeout_secs: float = 15.0) -> None:
+        """Until a JavaScript expression is true. Asked from outside: the page's own policy lets no text become a program in it."""
+        end = time.monotonic() + timeout_secs
+        while not self.page.evaluate(condition):
+            assert time.monotonic() < end, f"after {timeout_secs:.0f} s this is still not so: {condition}"
+            self.page.wait_for_timeout(20)
 
     def live(self, drives: bool = True) -> "View":
         """Until there is a picture, and this page drives it."""
@@ -118,7 +124,7 @@ class View:
     def text(self, selector: str) -> str:
         return self.page.locator(selector).inner_text()
 
-    def exact(self, timeout_secs: float = 15.0) -> None:
+    def exact(self, timeout_secs: float = 30.0) -> None:
         """Until the page has found its canvas equal to the server's picture."""
         self.wait("document.querySelector('#picture').dataset.exact === 'true'", timeout_secs)
 
