@@ -116,7 +116,8 @@ def moves_with_the_hands(bench: Bench) -> str:
     changed("flying", lambda: (keyboard.down("w"), view.page.wait_for_timeout(300), keyboard.up("w")))
     changed("coming back", lambda: keyboard.press("Home"))
     assert view.page.input_value("#camera") == "0"
-    assert psnr(seen[0], seen[-1]) > 30, "Home is not where it began"
+    back = psnr(seen[0], seen[-1])
+    assert back > 25, f"Home is not where it began ({back:.1f} dB)"
     view.page.check("#antialias")
     latencies = view.page.evaluate("seen.latencies")
     assert latencies, "no latency was measured"
@@ -317,26 +318,31 @@ def saves_and_records(bench: Bench) -> str:
     download.value.save_as(path)
     assert np.array_equal(np.asarray(Image.open(path).convert("RGB")), view.pixels()), "the PNG is another picture"
     view.page.click("#play")
+    own = recorded(bench, view)
+    without = bench.open(drives=False, before="delete globalThis.MediaRecorder;")
+    return f"{own} by the browser, {recorded(bench, without)} by the server"
+
+
+def recorded(bench: Bench, view: View) -> str:
     view.page.keyboard.press("r")
     view.wait("document.querySelector('#record').getAttribute('aria-pressed') === 'true'")
-    view.page.wait_for_timeout(1500)
+    view.page.wait_for_timeout(2000)
     with view.page.expect_download() as download:
         view.page.keyboard.press("r")
-    name = download.value.suggested_filename
-    path = bench.folder / name
+    path = bench.folder / download.value.suggested_filename
     download.value.save_as(path)
+    assert path.suffix == ".mp4", path.name
     blank = view.context.new_page()  # the page's own policy lets no video in
-    base64 = b64encode(path.read_bytes()).decode()
-    width, secs = blank.evaluate(PLAY, [base64, f"video/{path.suffix[1:]}"])
-    assert abs(width - view.size()[0]) <= 1 and 1 < secs < 5, f"{name}: {width} pixels wide, {secs} s"
-    return f"{name}, {secs:.1f} s"
+    width, secs = blank.evaluate(PLAY, b64encode(path.read_bytes()).decode())
+    assert width == view.size()[0] and 1.5 < secs < 4, f"{path.name}: {width} pixels wide, {secs} s"
+    return f"{secs:.1f} s"
 
 
 # What a video element makes of these bytes: its width in pixels, and for how many seconds it plays.
-PLAY = """async ([base64, type]) => {
+PLAY = """async (base64) => {
   const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
   const video = document.createElement("video");
-  video.src = URL.createObjectURL(new Blob([bytes], { type }));
+  video.src = URL.createObjectURL(new Blob([bytes], { type: "video/mp4" }));
   video.muted = true;
   video.playbackRate = 8;
   const ended = new Promise((done, failed) => { video.onended = done; video.onerror = failed; });

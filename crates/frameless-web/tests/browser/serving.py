@@ -83,7 +83,7 @@ def launch(playwright: Playwright) -> Browser:
 class View:
     """One page in a browser context of its own, with what its console says."""
 
-    def __init__(self, browser: Browser, url: str, size=(1280, 800), theme="dark", **options):
+    def __init__(self, browser: Browser, url: str, size=(1280, 800), theme="dark", before="", **options):
         self.context = browser.new_context(
             viewport={"width": size[0], "height": size[1]}, color_scheme=theme, **options
         )
@@ -91,7 +91,7 @@ class View:
         self.page: Page = self.context.new_page()
         self.page.on("console", self._console)
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.add_init_script(LISTEN)
+        self.page.add_init_script(LISTEN + before)
         self.page.goto(url)
         # The address with the secret leads on to one without.
         self.page.wait_for_url(lambda now: "key=" not in now)
