@@ -125,8 +125,16 @@ class View:
         return self.page.locator(selector).inner_text()
 
     def exact(self, timeout_secs: float = 30.0) -> None:
-        """Until the page has found its canvas equal to the server's picture."""
-        self.wait("document.querySelector('#picture').dataset.exact === 'true'", timeout_secs)
+        """Until the page has found its canvas equal to the server's picture, and that has rested for a moment."""
+        rests = "performance.now() - seen.last > 250"
+        self.wait(f"{rests} && document.querySelector('#picture').dataset.exact === 'true'", timeout_secs)
+
+    def after(self, action) -> None:
+        """Does something that changes the picture; until the page shows what came of it, exactly."""
+        drawn = self.page.evaluate("seen.drawn")
+        action()
+        self.wait(f"seen.drawn > {drawn}")
+        self.exact()
 
     def pixels(self) -> np.ndarray:
         """What the canvas holds: height × width × 3, bytes."""
@@ -154,12 +162,18 @@ class View:
         self.page.mouse.move(x + by[0], y + by[1], steps=steps)
         self.page.mouse.up(button=button)
 
-    def pause(self, at_secs: float | None = None) -> None:
+    def pause(self) -> None:
         if self.page.locator("#play").get_attribute("aria-label") == "Pause":
             self.page.click("#play")
         self.wait("document.querySelector('#play').classList.contains('paused')")
-        if at_secs is not None:
-            self.scrub(at_secs)
+
+    def rest_at(self, secs: float) -> None:
+        """Paused at a time of the scene, without antialiasing, which would go on for seconds; until the page shows it exactly."""
+        self.page.uncheck("#antialias")
+        self.pause()
+        # From another time, so that there is a change to wait for.
+        self.after(lambda: self.scrub(secs + 0.3))
+        self.after(lambda: self.scrub(secs))
 
     def scrub(self, secs: float) -> None:
         self.page.locator("#scrub").evaluate(
