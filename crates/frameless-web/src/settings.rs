@@ -11,7 +11,7 @@ pub const MOST_PIXELS: usize = 3840 * 2160;
 // A picture in ten seconds of the smallest size, and more than any renderer traces.
 const RATES: std::ops::RangeInclusive<f64> = 1.0..=1e12;
 // 2^±64 reaches from the darkest to the brightest light there is.
-const MOST_STOPS: f32 = 64.0;
+const STOPS: std::ops::RangeInclusive<f32> = -64.0..=64.0;
 const TILES: std::ops::RangeInclusive<u32> = 1..=64;
 
 /// What the panel shows.
@@ -26,7 +26,7 @@ pub(crate) fn state(settings: &Settings) -> SettingsState {
         temporal,
         w_d,
         tile,
-        reconstruction: settings.reconstruction.name().into(),
+        reconstruction: settings.reconstruction.name(),
         samples_per_sec: settings.samples_per_sec,
         exposure_stops: settings.exposure_stops,
         overlay: overlay_name(settings.overlay),
@@ -60,8 +60,7 @@ pub(crate) fn changed(settings: &Settings, change: &SettingsChange) -> Result<Se
         };
     }
     if let Some(stops) = change.exposure_stops {
-        // Not `> MOST_STOPS`: NaN is refused, too.
-        if !(stops.abs() <= MOST_STOPS) {
+        if !STOPS.contains(&stops) {
             return Err(format!("an exposure of {stops} stops: wanted -64 to 64"));
         }
         new.exposure_stops = stops;

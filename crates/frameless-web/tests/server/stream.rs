@@ -117,7 +117,8 @@ fn every_setting_can_be_set_and_is_told() {
         (r#"{"type": "settings", "exposure_stops": -1}"#, "exposure_stops", "-1.0"),
     ] {
         client.say(say);
-        client.state(say, |state| state["settings"][key].to_string() == want);
+        let want: serde_json::Value = serde_json::from_str(want).unwrap();
+        client.state(say, |state| state["settings"][key] == want);
     }
     client.say(r#"{"type": "settings", "overlay": "source-age"}"#);
     let legend = client.until("a legend", |_, received| match received {
