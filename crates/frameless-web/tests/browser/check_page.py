@@ -344,8 +344,8 @@ PLAY = """async (base64) => {
   video.muted = true;
   video.playbackRate = 8;
   const ended = new Promise((done, failed) => { video.onended = done; video.onerror = failed; });
-  await video.play();
-  await ended;
+  const late = new Promise((_, failed) => setTimeout(() => failed(new Error("it does not play to its end")), 15_000));
+  await Promise.race([video.play().then(() => ended), late]);
   return [video.videoWidth, video.currentTime];
 }"""
 
