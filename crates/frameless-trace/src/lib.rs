@@ -31,10 +31,11 @@ mod shading;
 #[cfg(test)]
 mod test_scenes;
 
-pub use camera::ViewSource;
+pub use camera::{Camera, ViewSource};
 pub use cpu::{CpuTracer, thread_pool};
 pub use direct::Settings;
 pub use explain::explain;
 pub use moment::Moment;
+pub use ray::Ray;
 pub use render::render;
 pub use world::World;

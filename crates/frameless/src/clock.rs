@@ -124,10 +124,10 @@ impl Real {
         self.allowance_at = self.now();
     }
 
-    /// Time and number of samples of the next batch. Within a budget the number is 0 while nothing is due.
-    pub(crate) fn next_batch(&mut self) -> (Time, usize) {
+    /// Time and number of samples of the next batch, of which `wanted` are asked for. Within a budget the number is smaller, and 0
+    /// while nothing is due.
+    pub(crate) fn next_batch(&mut self, wanted: usize) -> (Time, usize) {
         let now = self.now();
-        let wanted = self.batch_length();
         let Some(budget) = self.budget_per_sec else { return (now, wanted) };
         // What was not used in time is lost: a renderer that stood still does not catch up in a burst.
         let earned = budget * now.secs_since(self.allowance_at);
@@ -180,7 +180,8 @@ mod tests {
         let mut total = 0;
         let until = clock.now().0 + 100_000_000;
         while clock.now().0 < until {
-            total += clock.next_batch().1;
+            let wanted = clock.batch_length();
+            total += clock.next_batch(wanted).1;
             std::thread::sleep(Duration::from_micros(500));
         }
         assert!(total <= 10_200, "100 ms at 100,000 samples/s: {total}");
