@@ -1,0 +1,1 @@
+from ._frameless import *
