@@ -64,8 +64,9 @@ impl Camera {
 #[pymethods]
 impl Camera {
     #[new]
-    #[pyo3(signature = (eye, target, up=[0.0, 1.0, 0.0], fov=45.0))]
-    fn new(eye: Triple, target: Triple, up: Triple, fov: f32) -> PyResult<Camera> {
+    #[pyo3(signature = (eye, target, up=None, fov=45.0))]
+    fn new(eye: Triple, target: Triple, up: Option<Triple>, fov: f32) -> PyResult<Camera> {
+        let up = up.unwrap_or([0.0, 1.0, 0.0]);
         for (name, point) in [("eye", eye), ("target", target), ("up", up)] {
             if !point.iter().all(|x| x.is_finite()) {
                 let message = format!("{name}: wanted three finite numbers, got {point:?}");

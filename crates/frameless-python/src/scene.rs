@@ -20,7 +20,7 @@ use crate::size::PictureSize;
 /// A scene that changes with time, and the renderer for it: direct light, hard shadows, mirrors, on all cores.
 ///
 /// Made by `Scene.builtin(name)` or `Scene.load(path)`. Any thread may use it.
-#[pyclass(frozen, module = "frameless", subclass)]
+#[pyclass(frozen, module = "frameless")]
 pub(crate) struct Scene {
     world: Arc<World>,
     /// Made when first used.

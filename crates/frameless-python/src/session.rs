@@ -20,10 +20,6 @@ use crate::sampler::{from_python, named};
 use crate::shared::{Length, Raised, Shared, State};
 use crate::size::{PictureSize, pair};
 
-/// How long a batch lasts unless told otherwise: feedback every 4 ms costs 8 to 15 % of the quality that 1 ms would have, and a
-/// call of Python with numpy some ten microseconds.
-const BATCH_MS: f64 = 4.0;
-
 /// A picture that is never finished: a canvas, a clock, and a sampler that says which pixels are worth tracing now.
 ///
 ///     with frameless.Session((640, 480)) as session:
@@ -39,7 +35,8 @@ const BATCH_MS: f64 = 4.0;
 /// camera : the Camera through which the renderer looks; needed if answers carry positions
 /// seed : of all that is random
 /// batch : samples per batch; default: learned, so that a batch lasts `batch_ms`, or longer if calls are expensive
-/// batch_ms : milliseconds from choosing a batch to its answer that are aimed at
+/// batch_ms : milliseconds from choosing a batch to its answer that are aimed at. Feedback every 4 ms costs 8 to 15 % of the quality
+///     that 1 ms would have; a call of Python costs some ten microseconds
 /// budget : samples per second at most; default: as many as the renderer can
 /// simulated : samples per second of a simulated clock, on which sample n is traced at n / rate however long it takes: the same
 ///     seed makes the same pictures. Default: the machine's clock
@@ -122,7 +119,7 @@ impl Session {
     #[new]
     #[pyo3(signature = (
         size, *, sampler=None, reconstruction="reproject+antialias", camera=None, seed=1, batch=None,
-        batch_ms=BATCH_MS, budget=None, simulated=None, noisy=false, exposure=0.0
+        batch_ms=4.0, budget=None, simulated=None, noisy=false, exposure=0.0
     ))]
     #[expect(clippy::too_many_arguments, reason = "Python's are named")]
     fn new(
