@@ -123,7 +123,7 @@ impl Tracer for CpuTracer {
         let mut workspace = self.shared.take_workspace(scene_secs);
         self.shared.world.update_moment(scene_secs, &mut workspace.moment);
         let view = self.view.at(self.shared.world.scene(), workspace.moment.state());
-        workspace.moment.pose(&view, size, pose);
+        self.shared.world.pose(&workspace.moment, &view, size, pose);
         self.shared.idle().push(workspace);
         true
     }
@@ -131,7 +131,7 @@ impl Tracer for CpuTracer {
     fn lighting(&mut self, scene_secs: f64, lighting: &mut Lighting) -> bool {
         let mut workspace = self.shared.take_workspace(scene_secs);
         self.shared.world.update_moment(scene_secs, &mut workspace.moment);
-        workspace.moment.lighting(lighting);
+        self.shared.world.lighting(&workspace.moment, lighting);
         self.shared.idle().push(workspace);
         true
     }

@@ -8,9 +8,10 @@
 
 use frameless::{Request, Size, Surface};
 use frameless_scene::{Material, View};
-use glam::Vec3A;
+use glam::{Vec3, Vec3A};
 
 use crate::camera::Camera;
+use crate::images::{self, MirrorSide};
 use crate::moment::Moment;
 use crate::point::Point;
 use crate::ray::Ray;
@@ -71,6 +72,8 @@ impl World {
         let mut radiance = Vec3A::ZERO;
         let mut throughput = Vec3A::ONE;
         let mut first = None;
+        // The mirror in which the next surface is the first that is seen.
+        let mut mirror_side = None;
         for depth in 0..=settings.max_depth {
             probe
                 .note(|| format!("ray {depth}: from {:.5} along {:.5}", ray.origin, ray.direction));
@@ -83,7 +86,8 @@ impl World {
                     )
                 });
                 radiance += gives;
-                first.get_or_insert_with(|| sky_surface(&ray));
+                let seen = || sky_surface(&ray);
+                self.see(&mut first, seen, mirror_side.take(), throughput);
                 break;
             };
             probe.note(|| format!("  {hit:?}"));
@@ -101,7 +105,7 @@ impl World {
                 format!("  albedo {albedo:.5}, throughput {throughput:.5}: adds {gives:.6}")
             });
             radiance += gives;
-            first.get_or_insert_with(|| Surface {
+            let seen = || Surface {
                 object: hit.instance,
                 primitive: hit.primitive,
                 position: point.local_position.to_array(),
@@ -109,7 +113,14 @@ impl World {
                 albedo: albedo.to_array(),
                 direct: (albedo * irradiance).to_array(),
                 lit,
-            });
+            };
+            self.see(&mut first, seen, mirror_side.take(), throughput);
+            if depth == 0 && settings.surfaces {
+                let geometry = self.scene().instances[hit.instance as usize].geometry;
+                let placed = moment.placed(hit.instance);
+                mirror_side =
+                    self.mirrors.seen(geometry, hit.instance, hit.primitive, placed, ray.direction);
+            }
             throughput *= mirror * point.base;
             if throughput == Vec3A::ZERO {
                 break;
@@ -117,6 +128,24 @@ impl World {
             ray = Ray { origin: point.outside, direction: reflect(ray.direction, &point) };
         }
         (finite(radiance), first.unwrap_or_else(|| sky_surface(&ray)))
+    }
+
+    /// Keeps the surface that a sample belongs to: the first that is hit, or the image of the second in a plane mirror.
+    #[inline(always)]
+    fn see(
+        &self,
+        first: &mut Option<Surface>,
+        seen: impl FnOnce() -> Surface,
+        mirror_side: Option<MirrorSide>,
+        throughput: Vec3A,
+    ) {
+        if let Some(side) = mirror_side {
+            let surface = seen();
+            let object = self.mirrors.image_of(surface.object, side);
+            *first = Some(images::image(surface, object, throughput));
+        } else {
+            first.get_or_insert_with(seen);
+        }
     }
 
     /// Σ E cosθ V / π over the lights, and which of them reach the point (see [`Surface::lit`]; the first 32).
@@ -202,6 +231,11 @@ fn reflect(direction: Vec3A, point: &Point) -> Vec3A {
 /// Radiance as promised: what is not a number becomes black, what is beyond all numbers the largest.
 fn finite(radiance: Vec3A) -> [f32; 3] {
     radiance.to_array().map(|c| if c.is_nan() { 0.0 } else { c.clamp(0.0, f32::MAX) })
+}
+
+/// Whether the material reflects and does nothing else.
+pub(crate) fn is_pure_mirror(material: &Material) -> bool {
+    mirror_weight(material) == 1.0 && material.emissive == Vec3::ZERO
 }
 
 fn describe(point: &Point, material: &Material, mirror: f32) -> String {

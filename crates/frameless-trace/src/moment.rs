@@ -27,26 +27,6 @@ impl Moment {
         &self.state
     }
 
-    /// Fills in where every instance is in a picture of `size`.
-    pub fn pose(&self, view: &View, size: Size, pose: &mut Pose) {
-        let camera = Camera::new(view, size);
-        pose.picture_from_object.clear();
-        let instances =
-            self.placed.iter().map(|placed| camera.picture_from(&placed.world_from_object));
-        pose.picture_from_object.extend(instances);
-        pose.picture_from_sky = camera.picture_from_direction();
-        pose.deformed.clear();
-    }
-
-    /// Fills in the lights, and how every instance stands in the world.
-    pub fn lighting(&self, lighting: &mut Lighting) {
-        lighting.lights.clone_from(&self.lights);
-        lighting.world_from_object.clear();
-        let placements =
-            self.placed.iter().map(|placed| Some(placement(&placed.world_from_object)));
-        lighting.world_from_object.extend(placements);
-    }
-
     pub(crate) fn placed(&self, instance: u32) -> &Placed {
         &self.placed[instance as usize]
     }
@@ -112,6 +92,30 @@ impl World {
         }
         // No time equals NaN: what the scene shows by itself at this time is another picture.
         moment.shows = Some((self.id, f64::NAN));
+    }
+
+    /// Fills in where everything is in a picture of `size` at `moment`, which shows this world: every instance, and its images in
+    /// mirrors.
+    pub fn pose(&self, moment: &Moment, view: &View, size: Size, pose: &mut Pose) {
+        let camera = Camera::new(view, size);
+        pose.picture_from_object.clear();
+        let instances =
+            moment.placed.iter().map(|placed| camera.picture_from(&placed.world_from_object));
+        pose.picture_from_object.extend(instances);
+        pose.picture_from_sky = camera.picture_from_direction();
+        pose.deformed.clear();
+        self.mirrors.pose(&moment.placed, &camera, pose);
+    }
+
+    /// Fills in the lights of `moment`, which shows this world, and how every instance stands in it; what is seen in mirrors is lit
+    /// where it is.
+    pub fn lighting(&self, moment: &Moment, lighting: &mut Lighting) {
+        lighting.lights.clone_from(&moment.lights);
+        lighting.world_from_object.clear();
+        let placements =
+            moment.placed.iter().map(|placed| Some(placement(&placed.world_from_object)));
+        lighting.world_from_object.extend(placements);
+        self.mirrors.repeat(&mut lighting.world_from_object, None);
     }
 
     /// Whether any instance has moved.

@@ -7,6 +7,7 @@ use frameless_scene::{Geometry, Mesh, Scene};
 use rayon::prelude::*;
 
 use crate::build::Blas;
+use crate::images::Mirrors;
 use crate::kernel::Isa;
 use crate::texture::linear_from_srgb_table;
 
@@ -16,6 +17,7 @@ pub struct World {
     /// Per geometry; empty for spheres.
     pub(crate) blas: Vec<Blas>,
     pub(crate) linear_from_srgb: [f32; 256],
+    pub(crate) mirrors: Mirrors,
     pub(crate) isa: Isa,
     /// Tells the moments of this world from those of others.
     pub(crate) id: u64,
@@ -35,6 +37,7 @@ impl World {
         });
         World {
             blas: blas.collect(),
+            mirrors: Mirrors::new(&scene),
             scene,
             linear_from_srgb: linear_from_srgb_table(),
             isa,

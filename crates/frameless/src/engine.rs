@@ -175,6 +175,11 @@ impl<T: Tracer> Engine<T> {
     }
 
     fn step_real(&mut self) -> Result<usize, EngineError> {
+        if let Clock::Real(clock) = &mut self.clock
+            && let Some(wanted) = clock.next_call()
+        {
+            return self.step_call(wanted);
+        }
         while let Clock::Real(clock) = &mut self.clock {
             if self.outstanding >= PIPELINE_DEPTH * clock.batch_length() {
                 break;
@@ -191,6 +196,21 @@ impl<T: Tracer> Engine<T> {
         }
         let kept = self.collect_one()?.unwrap_or(0);
         self.clock.answered(kept, self.outstanding > 0);
+        Ok(kept)
+    }
+
+    /// One batch, awaited, for a renderer whose calls have a price.
+    fn step_call(&mut self, wanted: usize) -> Result<usize, EngineError> {
+        let batch = self.choose(wanted);
+        let (now, samples) = (batch.now, batch.requests.len());
+        if samples == 0 {
+            self.clock.rest();
+            return Ok(0);
+        }
+        self.outstanding += samples;
+        self.tracer.submit(batch);
+        let kept = self.collect_all()?;
+        self.clock.called(samples, now);
         Ok(kept)
     }
 

@@ -181,6 +181,11 @@ impl Settled {
             },
         ));
         self.sky_moved = now.picture_from_sky != before.picture_from_sky;
+        if now.windows != before.windows {
+            // Who stands still may yet go out of sight.
+            self.moved.fill(true);
+            self.sky_moved = true;
+        }
     }
 
     /// Whether any object may rest.
