@@ -27,6 +27,7 @@ from ._frameless import (
     Session,
     __version__,
 )
+from . import metrics
 from .experiment import compare, compare_file
 from .png import save_png
 from .samples import Samples
@@ -48,5 +49,6 @@ __all__ = [
     "__version__",
     "compare",
     "compare_file",
+    "metrics",
     "save_png",
 ]

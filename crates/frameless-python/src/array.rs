@@ -99,7 +99,7 @@ fn copied<T: Element + Copy>(
 ) -> Vec<[f32; 3]> {
     match array.as_slice() {
         Ok(slice) => slice.as_chunks().0.iter().map(|&[r, g, b]| [r, g, b].map(&convert)).collect(),
-        Err(_) => {
+        _ => {
             let rows = array.as_array();
             let rows = rows.rows().into_iter();
             rows.map(|row| [row[0], row[1], row[2]].map(&convert)).collect()

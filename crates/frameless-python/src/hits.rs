@@ -8,8 +8,8 @@ use crate::array::{self, Where};
 use crate::camera::Camera;
 use crate::outside::{Placed, surface};
 
-/// Objects are looked up by number at every refresh.
-const MOST_OBJECTS: i64 = 1 << 16;
+/// Every object up to the largest number is placed at every refresh: 0.1 s for so many.
+const MOST_OBJECTS: i64 = 1 << 20;
 
 /// Arrays as they came.
 pub(crate) struct Arrays<'a, 'py> {

@@ -74,6 +74,7 @@ impl Tracer for Outside {
         }));
         pose.picture_from_sky = optics.picture_from_direction();
         pose.deformed.clear();
+        pose.windows.clear();
         true
     }
 }

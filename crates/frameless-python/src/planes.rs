@@ -30,9 +30,10 @@ pub(crate) fn image<'py>(
     }
     let mut target = out.try_readwrite()?;
     let flat = picture.into_flattened();
+    let in_order = target.is_c_contiguous();
     match target.as_slice_mut() {
-        Ok(slice) => slice.copy_from_slice(&flat),
-        Err(_) => target.as_array_mut().iter_mut().zip(flat).for_each(|(out, new)| *out = new),
+        Ok(slice) if in_order => slice.copy_from_slice(&flat),
+        _ => target.as_array_mut().iter_mut().zip(flat).for_each(|(out, new)| *out = new),
     }
     Ok(out)
 }

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use frameless::{Answer, Batch, Deformed, Pose, Request, Size, Surface, Time, Tracer};
+use frameless::{Answer, Batch, Pose, Request, Size, Surface, Time, Tracer};
 use frameless_scene::{BUILTIN_NAMES, Limits, State, View, builtin, load};
-use frameless_trace::{CpuTracer, Settings, ViewSource, World, render, thread_pool};
-use glam::{Mat4, Vec3};
+use frameless_trace::{CpuTracer, Ray, Settings, ViewSource, World, render, thread_pool};
+use glam::{Mat4, Vec3A};
 use numpy::PyArray3;
 use numpy::prelude::*;
 use pyo3::exceptions::{PyOSError, PyValueError};
@@ -87,32 +87,26 @@ fn request([x, y]: [f32; 2], size: Size) -> Request {
     Request { pixel: size.index(column, row), offset, sample_index: 0 }
 }
 
-/// A hit in the world's coordinates: position and normal.
+/// A hit in the world's coordinates: position and normal; of the sky, the direction. What is seen in a plane mirror is where its
+/// image is, behind the mirror.
 fn in_world(
     surface: &Surface,
+    pose: &Pose,
+    ray: &Ray,
+    forward: Vec3A,
     state: &State,
     scene: &frameless_scene::Scene,
-    deformed: &[Option<Deformed>],
 ) -> ([f32; 3], [f32; 3]) {
-    let Some(instance) = scene.instances.get(surface.object as usize) else {
-        // The sky: the direction.
-        return (surface.position, [0.0; 3]);
-    };
-    let world_from_object = state.world_from_node[instance.node as usize];
-    let local = match deformed.get(surface.object as usize) {
-        Some(Some(deformed)) => deformed_point(surface, deformed),
-        _ => Vec3::from(surface.position),
-    };
-    let linear = world_from_object.matrix3;
-    let normal = linear.inverse().transpose() * glam::Vec3A::from(surface.normal);
-    (world_from_object.transform_point3(local).to_array(), normal.normalize_or_zero().to_array())
-}
-
-/// The point with the surface's barycentric weights.
-fn deformed_point(surface: &Surface, deformed: &Deformed) -> Vec3 {
-    let corners = deformed.triangles.get(surface.primitive as usize).copied().unwrap_or_default();
-    let corner = |corner: u32| deformed.positions.get(corner as usize).copied().unwrap_or_default();
-    corners.iter().zip(surface.position).map(|(&c, weight)| weight * Vec3::from(corner(c))).sum()
+    let depth = pose.project(surface).map_or(f32::INFINITY, |there| there.depth);
+    if !depth.is_finite() {
+        return (ray.direction.to_array(), [0.0; 3]);
+    }
+    let position = ray.origin + ray.direction * (depth / ray.direction.dot(forward));
+    let normal = scene.instances.get(surface.object as usize).map_or(Vec3A::ZERO, |instance| {
+        let linear = state.world_from_node[instance.node as usize].matrix3;
+        (linear.inverse().transpose() * Vec3A::from(surface.normal)).normalize_or_zero()
+    });
+    (position.to_array(), normal.to_array())
 }
 
 #[pymethods]
@@ -251,8 +245,11 @@ impl Scene {
         let (answer, pose) =
             answer.ok_or_else(|| PyValueError::new_err("the tracer gave no answer"))?;
         let state = self.scene().state_at(secs);
-        let hits =
-            answer.surfaces.iter().map(|s| in_world(s, &state, self.scene(), &pose.deformed));
+        let (optics, forward) =
+            (camera.optics(size), -camera.view().world_from_camera.matrix3.z_axis);
+        let hits = answer.requests.iter().zip(&answer.surfaces).map(|(request, surface)| {
+            in_world(surface, &pose, &optics.ray(request), forward, &state, self.scene())
+        });
         let (position, normal): (Vec<_>, Vec<_>) = hits.unzip();
         let object = answer.surfaces.iter().map(|surface| match surface.object {
             Surface::SKY => -1,
