@@ -125,7 +125,7 @@ def test_time_can_be_set_and_stopped() -> None:
     session.speed = -2.0
     times = [batch.time for batch in session.batches(0.01)]
     assert times[0] == pytest.approx(5.0) and np.diff(times) == pytest.approx([-2 / 960] * 9)
-    assert session.time == pytest.approx(5.0 - 0.04, abs=0.003) and session.speed == -2.0
+    assert session.time == pytest.approx(5.0 - 0.02, abs=0.003) and session.speed == -2.0
 
 
 def test_another_size_keeps_the_picture() -> None:

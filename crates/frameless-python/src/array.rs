@@ -98,7 +98,10 @@ fn copied<T: Element + Copy>(
     convert: impl Fn(T) -> f32,
 ) -> Vec<[f32; 3]> {
     match array.as_slice() {
-        Ok(slice) => slice.as_chunks().0.iter().map(|&[r, g, b]| [r, g, b].map(&convert)).collect(),
+        // As a slice there are also arrays whose columns come first.
+        Ok(slice) if array.is_c_contiguous() => {
+            slice.as_chunks().0.iter().map(|&[r, g, b]| [r, g, b].map(&convert)).collect()
+        }
         _ => {
             let rows = array.as_array();
             let rows = rows.rows().into_iter();

@@ -18,9 +18,7 @@ pub(crate) fn image<'py>(
 ) -> PyResult<Bound<'py, PyArray3<f32>>> {
     let (size, picture) = shared.with(py, |state| {
         let now = now.unwrap_or_else(|| state.engine.now());
-        let mut picture = Vec::new();
-        state.engine.refresh_into(now, &mut picture);
-        (state.engine.canvas().size(), picture)
+        (state.engine.canvas().size(), state.picture(now, Vec::new()))
     })?;
     let Some(out) = out else { return array::colours(py, size, picture) };
     let wanted = [size.height as usize, size.width as usize, 3];

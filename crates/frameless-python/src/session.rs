@@ -89,6 +89,7 @@ impl Session {
                 if state.is_closed || is_over {
                     return None;
                 }
+                state.refresh_if_due();
                 let wanted = state.length.next_length();
                 let asked = state.engine.choose(wanted);
                 let outside = state.engine.tracer();

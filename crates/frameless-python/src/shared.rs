@@ -57,13 +57,48 @@ pub(crate) struct State {
     pub(crate) changes: Vec<f32>,
     /// Which canvas `changes` are of.
     generation: u32,
+    refreshes: Refreshes,
 }
+
+/// When pictures were made. Whoever never asks for one has them made all the same, since samplers learn from them what is shown.
+#[derive(Default)]
+struct Refreshes {
+    last: Time,
+    cost_secs: f64,
+    unseen: Vec<[f32; 3]>,
+}
+
+/// As a display does.
+const REFRESH_SECS: f64 = 1.0 / 60.0;
+/// Pictures that nobody has asked for take at most a fifth of the time.
+const COSTS_PER_REFRESH: f64 = 5.0;
 
 impl State {
     pub(crate) fn new(engine: Engine<Outside>, length: Length) -> State {
         let changes = vec![f32::NAN; engine.canvas().size().pixels()];
         let generation = engine.canvas().generation();
-        State { engine, length, budget: None, is_closed: false, changes, generation }
+        let refreshes = Refreshes::default();
+        State { engine, length, budget: None, is_closed: false, changes, generation, refreshes }
+    }
+
+    /// The picture at `now`.
+    pub(crate) fn picture(&mut self, now: Time, mut memory: Vec<[f32; 3]>) -> Vec<[f32; 3]> {
+        let begin = self.engine.now();
+        self.engine.refresh_into(now, &mut memory);
+        self.refreshes.last = now;
+        self.refreshes.cost_secs = self.engine.now().secs_since(begin);
+        memory
+    }
+
+    /// Makes a picture that nobody sees, if none has been made for long.
+    pub(crate) fn refresh_if_due(&mut self) {
+        let now = self.engine.now();
+        let interval_secs = REFRESH_SECS.max(COSTS_PER_REFRESH * self.refreshes.cost_secs);
+        // The clock's times are rounded down.
+        if now.secs_since(self.refreshes.last) + 1e-9 >= interval_secs {
+            let memory = std::mem::take(&mut self.refreshes.unseen);
+            self.refreshes.unseen = self.picture(now, memory);
+        }
     }
 
     /// Notes what the newest answer changed.
