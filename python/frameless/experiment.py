@@ -79,6 +79,8 @@ def compare(
     rates = [samples_per_sec] if isinstance(samples_per_sec, (int, float)) else list(samples_per_sec)
     named = [algorithm for algorithm in algorithms if isinstance(algorithm, str)]
     custom = [algorithm for algorithm in algorithms if not isinstance(algorithm, str)]
+    if not algorithms:
+        raise ValueError("algorithms: wanted at least one algorithm, got none")
     width, height = size
     lines = [
         'title = "compare"',

@@ -1,6 +1,8 @@
 """What several tests use."""
 
-from typing import Any
+import os
+from collections.abc import Callable
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
@@ -29,3 +31,15 @@ def srgb(linear: NDArray[Any]) -> NDArray[Any]:
 @pytest.fixture
 def session() -> frameless.Session:
     return frameless.Session((40, 30), batch=100, reconstruction="hold", sampler="permutation")
+
+
+@pytest.fixture
+def report_skip() -> Callable[[str], NoReturn]:
+    """Skips aloud; fails in CI, where nothing may be missing."""
+
+    def skip(missing: str) -> NoReturn:
+        if os.environ.get("CI") == "true":
+            pytest.fail(missing)
+        pytest.skip(missing)
+
+    return skip

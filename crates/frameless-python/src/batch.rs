@@ -2,13 +2,14 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use frameless::{Answer, Request};
+use frameless::Answer;
 use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::array;
 use crate::camera::Camera;
+use crate::columns;
 use crate::hits::Arrays;
 use crate::outside::Transforms;
 use crate::shared::Shared;
@@ -43,14 +44,6 @@ impl Batch {
     ) -> Batch {
         let answered = Mutex::new(Answered { left: asked.requests.len(), mask: Vec::new() });
         Batch { shared, asked, camera, transforms, answered }
-    }
-
-    fn column<'py, T: numpy::Element>(
-        &self,
-        py: Python<'py>,
-        value: impl Fn(&Request) -> T,
-    ) -> Bound<'py, PyArray1<T>> {
-        array::column(py, self.asked.requests.iter().map(value).collect())
     }
 
     fn position_px(&self, i: usize) -> [f32; 2] {
@@ -123,19 +116,12 @@ impl Batch {
         Ok(answered.left == 0)
     }
 
+    pub(crate) fn asked(&self) -> &frameless::Batch {
+        &self.asked
+    }
+
     pub(crate) fn camera_of_size(&self) -> Option<Camera> {
         self.camera.map(|camera| camera.of_size(self.asked.size))
-    }
-
-    pub(crate) fn scene_secs(&self) -> f64 {
-        self.asked.scene_secs
-    }
-
-    pub(crate) fn positions<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<f32>>) {
-        (self.x(py), self.y(py))
     }
 }
 
@@ -150,27 +136,25 @@ impl Batch {
     /// Columns to be traced, in pixels from the picture's left border (the first pixel's centre is 0.5): float32, shape (n,).
     #[getter]
     fn x<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
-        let size = self.asked.size;
-        self.column(py, |request| request.position_px(size)[0])
+        columns::x(py, &self.asked)
     }
 
     /// Rows to be traced, in pixels from the picture's upper border: float32, shape (n,).
     #[getter]
     fn y<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
-        let size = self.asked.size;
-        self.column(py, |request| request.position_px(size)[1])
+        columns::y(py, &self.asked)
     }
 
     /// Row-major pixel numbers, y · width + x: uint32, shape (n,).
     #[getter]
     fn pixel<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
-        self.column(py, |request| request.pixel)
+        columns::pixel(py, &self.asked)
     }
 
     /// Number of each sample in its pixel's sequence: uint32, shape (n,).
     #[getter]
     fn sample_index<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
-        self.column(py, |request| request.sample_index)
+        columns::sample_index(py, &self.asked)
     }
 
     /// A random number for each sample, the same whenever the same sample is asked for again: uint32, shape (n,).
@@ -178,7 +162,7 @@ impl Batch {
     /// A renderer with noise makes its random numbers from it alone; that is how noise is told from change.
     #[getter]
     fn seed<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
-        self.column(py, |request| pcg(request.sample_index.wrapping_add(pcg(request.pixel))))
+        columns::seed(py, &self.asked)
     }
 
     /// The moment of the scene to be traced, in seconds of the scene's own time.
@@ -244,11 +228,4 @@ impl Batch {
         let frameless::Batch { id, scene_secs, requests, .. } = &self.asked;
         format!("<frameless.Batch {id}: {} samples at {scene_secs:.3} s>", requests.len())
     }
-}
-
-/// A permutation of 32-bit numbers that looks random: PCG-RXS-M-XS (O'Neill 2014), as Jarzynski and Olano 2020 recommend it.
-fn pcg(input: u32) -> u32 {
-    let state = input.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
-    (word >> 22) ^ word
 }

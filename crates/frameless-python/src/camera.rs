@@ -56,6 +56,11 @@ impl Camera {
         frameless_trace::Camera::new(&self.view, size)
     }
 
+    /// From the eye to the target.
+    pub(crate) fn distance(&self) -> f32 {
+        self.distance
+    }
+
     fn ahead(&self) -> Vec3 {
         (-self.view.world_from_camera.matrix3.z_axis).into()
     }

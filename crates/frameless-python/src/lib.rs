@@ -7,6 +7,7 @@ mod array;
 mod batch;
 mod camera;
 mod canvas;
+mod columns;
 mod compare;
 mod hits;
 mod interrupt;

@@ -373,7 +373,7 @@ impl Session {
         let mut kept = 0;
         while let Some(batch) = self.next_batch(py, end)? {
             let is_noisy = self.shared.with(py, |state| state.engine.tracer().is_noisy)?;
-            kept += invoke::answer(py, render, &Bound::new(py, batch)?, is_noisy)?;
+            kept += invoke::answer(render, &batch, is_noisy)?;
             py.check_signals()?;
         }
         Ok(kept)
