@@ -8,6 +8,7 @@ mod program;
 mod python;
 mod steps;
 mod test;
+mod web;
 mod window;
 
 use std::path::PathBuf;
@@ -17,9 +18,11 @@ const HELP: &str = "\
 Project chores. Run them from anywhere in the checkout:
 
   cargo xtask test           everything that CI checks: formatting, clippy, all tests, the program as a
-                             user runs it, a small comparison with its video and report, and the window
+                             user runs it, a small comparison with its video and report, the web page, the window
   cargo xtask smoke-window   only the window: opens it on a virtual screen and looks at a screenshot
   cargo xtask smoke-report   only a small comparison: nothing got worse, and its report opens in a browser
+  cargo xtask smoke-web      only the web page: what it must do, in a headless browser
+  cargo xtask measure-web    the web page's latency, traffic and cost, in a headless browser; minutes, and a quiet machine
   cargo xtask help           this text
 
 What is missing on this machine is named together with the way to install it, and the checks that need it
@@ -33,6 +36,8 @@ fn main() -> ExitCode {
         ["test"] => test::everything(),
         ["smoke-window"] => test::only_window(),
         ["smoke-report"] => test::only_report(),
+        ["smoke-web"] => test::only_web_page(),
+        ["measure-web"] => test::measure_web_page(),
         [] | ["help" | "--help" | "-h"] => {
             println!("{HELP}");
             true

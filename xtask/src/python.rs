@@ -22,7 +22,7 @@ pub(crate) fn metrics(out: &Path) -> Result<Done> {
     if let Some(missing) = missing::to_make_a_venv() {
         return Ok(Done::skipped(format!("metrics against Python: {missing}")));
     }
-    if let Err(error) = install() {
+    if let Err(error) = install(REQUIREMENTS) {
         return Ok(Done::skipped(format!(
             "metrics against Python: the packages of {REQUIREMENTS} could not be installed: {error:#}"
         )));
@@ -42,8 +42,8 @@ pub(crate) fn metrics(out: &Path) -> Result<Done> {
     Ok(Done::passed(text.lines().last().unwrap_or_default()))
 }
 
-/// Makes the environment if there is none; asks nobody on the network if everything is there.
-fn install() -> Result<()> {
+/// Makes the environment if there is none; asks nobody on the network if everything in `requirements` is there.
+pub(crate) fn install(requirements: &str) -> Result<()> {
     if !crate::project_dir().join(PYTHON).exists() {
         let mut venv = Command::new("python3");
         venv.args(["-m", "venv", ".venv"]).current_dir(crate::project_dir());
@@ -51,13 +51,14 @@ fn install() -> Result<()> {
     }
     let mut pip = python();
     pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
-    pip.args(["--only-binary", ":all:", "-r", REQUIREMENTS]);
+    pip.args(["--only-binary", ":all:", "-r", requirements]);
     checked(&mut pip)
 }
 
 const PYTHON: &str = if cfg!(windows) { ".venv/Scripts/python.exe" } else { ".venv/bin/python" };
 
-fn python() -> Command {
+/// The environment's Python, in the project's root.
+pub(crate) fn python() -> Command {
     let mut python = Command::new(crate::project_dir().join(PYTHON));
     python.current_dir(crate::project_dir());
     python

@@ -9,6 +9,7 @@ use crate::command::{cargo, run, watch};
 use crate::missing::{self, Missing};
 use crate::program;
 use crate::steps::{Done, Steps};
+use crate::web;
 use crate::window;
 
 /// Every check. True if nothing failed.
@@ -23,7 +24,22 @@ pub(crate) fn everything() -> bool {
     steps.step("the program", || program::as_a_user(&program()?, &out_dir("program")?));
     steps.step("a comparison", || program::a_comparison(&program()?, &out_dir("comparison")?));
     steps.step("the report in a browser", open_report);
+    steps.step("the web page", || web::page(&program()?, &out_dir("web")?));
     steps.step("the window", || open_window(&program()?));
+    steps.finish()
+}
+
+/// Only the web page. True if nothing failed.
+pub(crate) fn only_web_page() -> bool {
+    let mut steps = Steps::new(in_ci());
+    steps.step("the web page", || web::page(&build()?, &out_dir("web")?));
+    steps.finish()
+}
+
+/// The web page's numbers. True if they could be measured.
+pub(crate) fn measure_web_page() -> bool {
+    let mut steps = Steps::new(in_ci());
+    steps.step("the web page, measured", || web::measure(&out_dir("web-measured")?));
     steps.finish()
 }
 

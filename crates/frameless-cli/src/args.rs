@@ -1,5 +1,7 @@
 //! What the program can be asked, and the help that teaches it.
 
+mod serve;
+
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Parser, Subcommand};
@@ -8,12 +10,14 @@ use frameless::{ReconstructionKind, Size};
 use crate::failure::Failure;
 use crate::parse;
 
+pub(crate) use serve::ServeArgs;
+
 const LONG_ABOUT: &str = "\
 Frameless rendering: every sample is one pixel traced at the current time and shown at once.
 
 There are no frames: a sampler chooses which pixels are worth tracing now, learns from what changed, and \
 the picture is always as new as its newest sample. Without a subcommand a window opens on the scene \
-`sphere`.";
+`sphere`, or a web page is served where there is no display.";
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -21,6 +25,8 @@ Examples:
       the moving sphere, in a window
   frameless view model.glb
       your own scene
+  frameless serve model.glb
+      the same on a web page: it prints the one address to open
   frameless view sphere --sampler random --reconstruction hold
       as it began in 1994: pixels chosen at random, each shown until its next sample
   frameless compare experiments/figures.toml --out out/figures
@@ -45,6 +51,7 @@ pub(crate) struct Args {
 #[derive(Subcommand)]
 pub(crate) enum Command {
     View(ViewArgs),
+    Serve(ServeArgs),
     Compare(CompareArgs),
     Render(RenderArgs),
     Trace(TraceArgs),
@@ -57,8 +64,8 @@ pub(crate) enum Command {
 
 /// Look at a scene in a window while it is being traced
 ///
-/// Keys and mouse are explained in the window. Where there is no display, `frameless compare` makes
-/// pictures and a video instead, and `frameless render` a picture.
+/// Keys and mouse are explained in the window. Where there is no display, it is served as a web page, as by
+/// `frameless serve`.
 #[derive(ClapArgs)]
 #[command(after_help = "Examples:
   frameless view
@@ -67,6 +74,22 @@ pub(crate) enum Command {
       the algorithm of 2002
   frameless view sphere --size 512x384 --screenshot shot.png --after 3")]
 pub(crate) struct ViewArgs {
+    #[command(flatten)]
+    pub(crate) look: LookArgs,
+
+    /// Save the window's picture to this PNG file after --after seconds, and end
+    #[arg(long, value_name = "FILE")]
+    pub(crate) screenshot: Option<PathBuf>,
+
+    /// When to save the screenshot, in seconds after the window has opened
+    #[arg(long, value_name = "SECS", default_value = "3", value_parser = parse::wait_secs)]
+    #[arg(requires = "screenshot")]
+    pub(crate) after: f64,
+}
+
+/// What is looked at, and how it is traced.
+#[derive(ClapArgs)]
+pub(crate) struct LookArgs {
     /// A glTF file or a built-in scene
     #[arg(default_value = DEFAULT_SCENE)]
     pub(crate) scene: String,
@@ -118,15 +141,6 @@ pub(crate) struct ViewArgs {
     /// The seed of all random choices
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,
-
-    /// Save the window's picture to this PNG file after --after seconds, and end
-    #[arg(long, value_name = "FILE")]
-    pub(crate) screenshot: Option<PathBuf>,
-
-    /// When to save the screenshot, in seconds after the window has opened
-    #[arg(long, value_name = "SECS", default_value = "3", value_parser = parse::wait_secs)]
-    #[arg(requires = "screenshot")]
-    pub(crate) after: f64,
 }
 
 /// The scene of `frameless` without arguments.
@@ -135,7 +149,7 @@ const DEFAULT_SCENE: &str = "sphere";
 impl Default for ViewArgs {
     /// As if `frameless view` had been typed.
     fn default() -> ViewArgs {
-        ViewArgs {
+        let look = LookArgs {
             scene: DEFAULT_SCENE.into(),
             sampler: None,
             reconstruction: None,
@@ -146,9 +160,8 @@ impl Default for ViewArgs {
             exposure: 0.0,
             threads: 0,
             seed: 1,
-            screenshot: None,
-            after: 3.0,
-        }
+        };
+        ViewArgs { look, screenshot: None, after: 3.0 }
     }
 }
 
@@ -276,6 +289,8 @@ mod tests {
             panic!("`frameless view` is refused");
         };
         let default = ViewArgs::default();
+        assert_eq!((typed.screenshot, typed.after), (default.screenshot, default.after));
+        let (typed, default) = (typed.look, default.look);
         assert_eq!(
             (typed.scene, typed.sampler, typed.size, typed.rate, typed.camera),
             (default.scene, default.sampler, default.size, default.rate, default.camera)
@@ -285,8 +300,8 @@ mod tests {
             (default.reconstruction, default.temporal)
         );
         assert_eq!(
-            (typed.exposure, typed.threads, typed.seed, typed.screenshot, typed.after),
-            (default.exposure, default.threads, default.seed, default.screenshot, default.after)
+            (typed.exposure, typed.threads, typed.seed),
+            (default.exposure, default.threads, default.seed)
         );
     }
 }

@@ -11,6 +11,7 @@ mod output;
 mod parse;
 mod render;
 mod scenes;
+mod serve;
 mod trace;
 mod view;
 
@@ -40,6 +41,7 @@ fn main() -> ExitCode {
 fn run(args: Args) -> Result<(), Failure> {
     match args.command.unwrap_or_else(|| Command::View(ViewArgs::default())) {
         Command::View(args) => view::run(&args),
+        Command::Serve(args) => serve::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Trace(args) => trace::run(&args),

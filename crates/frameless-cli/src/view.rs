@@ -1,15 +1,16 @@
-//! `frameless view`: the window.
+//! `frameless view`: the window, or the web page where there is no display.
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::anyhow;
 use frameless::SamplerKind;
-use frameless_view::{PictureSize, Settings, ViewOptions};
+use frameless_scene::Scene;
+use frameless_view::{NoDisplay, PictureSize, Settings, ViewOptions};
 
-use crate::args::ViewArgs;
+use crate::args::{LookArgs, ViewArgs};
 use crate::failure::Failure;
-use crate::{input, output};
+use crate::{input, output, serve};
 
 /// The screenshot is taken by the graphics driver and arrives some refreshes after it was asked for; a
 /// software driver on a busy machine may take a second for it.
@@ -20,16 +21,17 @@ pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
     if let Some(screenshot) = &args.screenshot {
         output::check_png_path(screenshot)?;
     }
-    let settings = settings(args)?;
-    let mut scene = input::scene(&args.scene)?;
-    let first = input::camera(&scene, args.camera)?;
-    // The window begins with the first camera.
-    scene.cameras.rotate_left(first as usize);
-    let mut options = ViewOptions::new(Arc::new(scene));
+    let settings = settings(&args.look)?;
+    let mut options = ViewOptions::new(Arc::new(scene(&args.look)?));
     options.settings = settings;
-    options.threads = args.threads;
-    options.seed = args.seed;
-    let Some(screenshot) = &args.screenshot else { return Ok(frameless_view::run(options)?) };
+    options.threads = args.look.threads;
+    options.seed = args.look.seed;
+    let Some(screenshot) = &args.screenshot else {
+        return match frameless_view::run(options) {
+            Err(error) if error.is::<NoDisplay>() => serve::instead(&args.look, &error),
+            result => Ok(result?),
+        };
+    };
 
     let after = Duration::from_secs_f64(args.after);
     options.screenshot_after = Some((after, screenshot.clone()));
@@ -44,7 +46,16 @@ pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
     Err(Failure::other(anyhow!("{shown} was not written: the window was closed too early")))
 }
 
-fn settings(args: &ViewArgs) -> Result<Settings, Failure> {
+/// The scene that is looked at, with the camera that is wanted as its first.
+pub(crate) fn scene(args: &LookArgs) -> Result<Scene, Failure> {
+    let mut scene = input::scene(&args.scene)?;
+    let first = input::camera(&scene, args.camera)?;
+    scene.cameras.rotate_left(first as usize);
+    Ok(scene)
+}
+
+/// Where the sliders stand first.
+pub(crate) fn settings(args: &LookArgs) -> Result<Settings, Failure> {
     let default = Settings::default();
     let named = args.sampler.as_deref().and_then(SamplerKind::from_name);
     let mut sampler = named.unwrap_or(default.sampler);

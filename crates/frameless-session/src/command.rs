@@ -24,6 +24,8 @@ pub enum Command<W> {
     Seek(f64),
     /// Seconds of the scene per second.
     Speed(f64),
+    /// A number that pictures give back: those which show the commands before it.
+    Mark(u64),
     /// A picture is wanted at the next refresh. Gives an old picture's memory back, and says what painting costs.
     WantPicture {
         /// Any bytes.
@@ -58,6 +60,8 @@ pub struct Picture {
     pub size: Size,
     /// sRGB-encoded RGBA, row-major from the top.
     pub rgba: Vec<[u8; 4]>,
+    /// The last [`Command::Mark`] before it; 0 before the first.
+    pub mark: u64,
     /// What the loop knows of itself.
     pub status: Status,
 }

@@ -22,14 +22,21 @@ pub enum Looking {
 pub struct Helm {
     scene: Arc<Scene>,
     looking: Looking,
-    // The scene's camera that was used last: where the user comes back to.
-    own_camera: u32,
+    // Where the user comes back to: the scene's camera that was used last, or the first view where there is no scene.
+    home: Looking,
 }
 
 impl Helm {
     /// Looks at the scene through its first camera.
     pub fn new(scene: Arc<Scene>) -> Helm {
-        Helm { scene, looking: Looking::Through(0), own_camera: 0 }
+        Helm { scene, looking: Looking::Through(0), home: Looking::Through(0) }
+    }
+
+    /// For a renderer whose scene is not known here: a free camera that begins at `view`, and orbits the point of its axis nearest to
+    /// `focus`. [`Helm::scene`] is empty, without any camera.
+    pub fn without_scene(view: &View, focus: Vec3) -> Helm {
+        let looking = Looking::Free(FreeCamera::from_view(view, focus));
+        Helm { scene: Arc::new(Scene::default()), looking, home: looking }
     }
 
     /// What is looked at.
@@ -55,13 +62,22 @@ impl Helm {
     /// # Panics
     /// Later, where the view is asked for, if the scene has no camera of that index.
     pub fn look_through(&mut self, camera: u32) -> ViewChoice {
-        (self.looking, self.own_camera) = (Looking::Through(camera), camera);
-        ViewChoice::Camera(camera)
+        self.home = Looking::Through(camera);
+        self.come_back()
     }
 
-    /// Back to the scene's camera that was used last.
+    /// Back to the scene's camera that was used last, or to the first view where there is no scene.
     pub fn come_back(&mut self) -> ViewChoice {
-        self.look_through(self.own_camera)
+        self.looking = self.home;
+        self.view()
+    }
+
+    /// What to ask the render loop for now.
+    pub fn view(&self) -> ViewChoice {
+        match self.looking {
+            Looking::Through(camera) => ViewChoice::Camera(camera),
+            Looking::Free(camera) => ViewChoice::Free(camera.view()),
+        }
     }
 
     /// Look from a given place, turning around the point of its axis that is nearest to the scene's middle at `scene_secs`.
@@ -79,7 +95,7 @@ impl Helm {
 
     fn free(&mut self, camera: FreeCamera) -> ViewChoice {
         self.looking = Looking::Free(camera);
-        ViewChoice::Free(camera.view())
+        self.view()
     }
 
     fn taken_camera(&self, scene_secs: f64) -> FreeCamera {
@@ -128,6 +144,17 @@ mod tests {
         helm.steer(0.0, |camera| camera.zoom(0.5));
         assert_eq!(helm.come_back(), ViewChoice::Camera(0));
         assert_eq!(helm.through(), Some(0));
+    }
+
+    #[test]
+    fn without_a_scene_the_user_comes_back_to_the_first_view() {
+        let view = helm().scene().view_at(&helm().scene().state_at(0.3), 0);
+        let mut helm = Helm::without_scene(&view, Vec3::ZERO);
+        let first = helm.view();
+        assert!(helm.scene().cameras.is_empty());
+        assert_ne!(helm.steer(0.0, |camera| camera.orbit(0.5, 0.1)), first);
+        assert_eq!(helm.come_back(), first);
+        assert_eq!(helm.through(), None);
     }
 
     #[test]

@@ -7,28 +7,27 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread::Builder;
 
 use frameless_scene::{Limits, Scene, builtin};
-use frameless_trace::World;
 
-/// A scene being read and prepared in a thread of its own.
-pub struct Loading {
+/// A scene being read and prepared in a thread of its own. `W` is a scene made ready for the renderer.
+pub struct Loading<W> {
     /// What the user asked for.
     pub name: String,
     /// What is being done.
     pub stage: &'static str,
-    progress: Receiver<Progress>,
+    progress: Receiver<Progress<W>>,
 }
 
-enum Progress {
+enum Progress<W> {
     Stage(&'static str),
-    Done(anyhow::Result<Arc<World>>),
+    Done(anyhow::Result<(Arc<Scene>, W)>),
 }
 
 /// How far it is.
-pub enum Outcome {
+pub enum Outcome<W> {
     /// Not there yet.
     Running,
-    /// Ready for the renderer; [`World::scene`] is what was read.
-    Ready(Arc<World>),
+    /// What was read, and the same ready for the renderer.
+    Ready(Arc<Scene>, W),
     /// Why not, for the user.
     Failed(String),
 }
@@ -44,23 +43,26 @@ pub fn open(name: &str, limits: &Limits) -> anyhow::Result<Scene> {
     }
 }
 
-impl Loading {
-    /// Begins to `open` what is called `name`. `wake` is called whenever there is news.
+impl<W: Send + 'static> Loading<W> {
+    /// Begins to `open` what is called `name`, and to `prepare` it for the renderer. `wake` is called whenever there is news.
     ///
     /// # Errors
     /// If the system has no thread left.
     pub fn start(
         name: String,
         open: impl FnOnce(&str) -> anyhow::Result<Scene> + Send + 'static,
+        prepare: impl FnOnce(&Arc<Scene>) -> W + Send + 'static,
         wake: impl Fn() + Send + 'static,
-    ) -> io::Result<Loading> {
+    ) -> io::Result<Loading<W>> {
         let (report, progress) = channel();
         let wanted = name.clone();
         Builder::new().name("load scene".to_owned()).spawn(move || {
             let world = open(&wanted).map(|scene| {
                 report.send(Progress::Stage("building the BVH of")).ok();
                 wake();
-                Arc::new(World::new(Arc::new(scene)))
+                let scene = Arc::new(scene);
+                let world = prepare(&scene);
+                (scene, world)
             });
             // Fails if the user has opened something else since.
             report.send(Progress::Done(world)).ok();
@@ -70,11 +72,11 @@ impl Loading {
     }
 
     /// What has happened since the last call.
-    pub fn poll(&mut self) -> Outcome {
+    pub fn poll(&mut self) -> Outcome<W> {
         loop {
             match self.progress.try_recv() {
                 Ok(Progress::Stage(stage)) => self.stage = stage,
-                Ok(Progress::Done(Ok(world))) => return Outcome::Ready(world),
+                Ok(Progress::Done(Ok((scene, world)))) => return Outcome::Ready(scene, world),
                 Ok(Progress::Done(Err(error))) => {
                     // The loader's errors begin with the file's name, and say all there is in one line.
                     return Outcome::Failed(format!("cannot open {error}"));
@@ -94,10 +96,15 @@ impl Loading {
 
 #[cfg(test)]
 mod tests {
+    use frameless_trace::World;
+
     use super::*;
 
-    fn outcome(open: impl FnOnce(&str) -> anyhow::Result<Scene> + Send + 'static) -> Outcome {
-        let mut loading = Loading::start("x.glb".to_owned(), open, || {}).unwrap();
+    fn outcome(
+        open: impl FnOnce(&str) -> anyhow::Result<Scene> + Send + 'static,
+    ) -> Outcome<Arc<World>> {
+        let prepare = |scene: &Arc<Scene>| Arc::new(World::new(Arc::clone(scene)));
+        let mut loading = Loading::start("x.glb".to_owned(), open, prepare, || {}).unwrap();
         loop {
             match loading.poll() {
                 Outcome::Running => std::thread::yield_now(),
@@ -109,8 +116,9 @@ mod tests {
     #[test]
     fn a_good_scene_becomes_a_world() {
         let named = |_: &str| Ok(Scene { name: "good".to_owned(), ..Scene::default() });
-        let Outcome::Ready(world) = outcome(named) else { panic!("not ready") };
-        assert_eq!(world.scene().name, "good");
+        let Outcome::Ready(scene, world) = outcome(named) else { panic!("not ready") };
+        assert_eq!(scene.name, "good");
+        assert!(Arc::ptr_eq(&scene, world.scene()));
     }
 
     #[test]

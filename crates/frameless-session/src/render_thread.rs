@@ -162,6 +162,15 @@ mod tests {
     }
 
     #[test]
+    fn a_picture_says_what_it_shows() {
+        let thread = start();
+        assert_eq!(picture(&thread).mark, 0);
+        thread.send(Command::Play(false));
+        thread.send(Command::Mark(7));
+        assert_eq!(picture(&thread).mark, 7);
+    }
+
+    #[test]
     fn a_renderer_that_fails_is_said_and_the_picture_stays() {
         let thread = start();
         while picture(&thread).status.ages.unknown > 0 {}

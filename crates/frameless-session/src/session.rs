@@ -33,6 +33,7 @@ pub struct Session<S> {
     held: Shown,
     heat_maps: HeatMaps,
     throughput: Throughput,
+    mark: u64,
 }
 
 impl<S: Stage> Session<S> {
@@ -45,7 +46,7 @@ impl<S: Stage> Session<S> {
         engine.set_reconstruction(settings.reconstruction.build());
         let held = Shown::new(engine.canvas(), *engine.display());
         let (heat_maps, throughput) = (HeatMaps::default(), Throughput::default());
-        Session { engine, settings, seed, held, heat_maps, throughput }
+        Session { engine, settings, seed, held, heat_maps, throughput, mark: 0 }
     }
 
     /// One turn of the loop.
@@ -86,8 +87,19 @@ impl<S: Stage> Session<S> {
             Command::Play(false) => self.engine.timeline_mut().pause(now),
             Command::Seek(scene_secs) => self.engine.timeline_mut().seek(now, scene_secs),
             Command::Speed(speed) => self.engine.timeline_mut().set_speed(now, speed),
+            Command::Mark(mark) => self.mark = mark,
             Command::WantPicture { .. } => {}
         }
+    }
+
+    /// How it is set.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Width and height of its pictures.
+    pub fn size(&self) -> Size {
+        self.engine.canvas().size()
     }
 
     /// Applies what differs, so that moving one slider does not make the sampler forget what it has learned.
@@ -154,7 +166,7 @@ impl<S: Stage> Session<S> {
             ages: shown::ages(self.engine.canvas(), now),
             overlay,
         };
-        Picture { size: self.engine.canvas().size(), rgba, status }
+        Picture { size: self.engine.canvas().size(), rgba, mark: self.mark, status }
     }
 }
 

@@ -6,6 +6,7 @@ use eframe::egui::{self, Align2, CentralPanel, Context, Key, Panel, Rect, Sense,
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu::DeviceType;
 use frameless::{Clock, Size};
+use frameless_scene::Scene;
 use frameless_session::{
     Command, Drawn, Helm, Loading, Outcome, Overlay, Picture, RenderThread, Report, Session,
     Settings, Status, snapshot,
@@ -36,7 +37,7 @@ pub(crate) struct App {
     // What the loop has been asked for already.
     sent_settings: Settings,
     sent_size: Size,
-    loading: Option<Loading>,
+    loading: Option<Loading<Arc<World>>>,
     messages: Messages,
     save_next: bool,
     timed: Timed,
@@ -144,7 +145,9 @@ impl App {
         let window = context.clone();
         let wake = move || window.request_repaint();
         let limits = self.options.limits.clone();
-        match Loading::start(name, move |name| frameless_session::open(name, &limits), wake) {
+        let open = move |name: &str| frameless_session::open(name, &limits);
+        let prepare = |scene: &Arc<Scene>| Arc::new(World::new(Arc::clone(scene)));
+        match Loading::start(name, open, prepare, wake) {
             Ok(loading) => self.loading = Some(loading),
             Err(error) => self.messages.error(error.to_string(), now_secs),
         }
@@ -154,9 +157,9 @@ impl App {
         match self.loading.as_mut().map(Loading::poll) {
             None | Some(Outcome::Running) => return,
             Some(Outcome::Failed(text)) => self.messages.error(text, now_secs),
-            Some(Outcome::Ready(world)) => {
-                self.helm = Helm::new(Arc::clone(world.scene()));
-                self.messages.info(format!("opened {}", world.scene().name), now_secs);
+            Some(Outcome::Ready(scene, world)) => {
+                self.messages.info(format!("opened {}", scene.name), now_secs);
+                self.helm = Helm::new(scene);
                 self.render.send(Command::Scene(world));
             }
         }

@@ -24,12 +24,13 @@ use eframe::egui::{ViewportBuilder, vec2};
 use frameless_trace::World;
 
 pub use frameless_session::{Overlay, PictureSize, Settings};
+pub use no_display::NoDisplay;
 pub use options::ViewOptions;
 
 /// Opens the window; returns when the user has closed it.
 ///
 /// # Errors
-/// If there is no display, or none that the graphics driver can draw on; the message says what to run instead.
+/// [`NoDisplay`] if there is none, or none that the graphics driver can draw on.
 pub fn run(options: ViewOptions) -> anyhow::Result<()> {
     no_display::check(|name| std::env::var_os(name))?;
     let world = Arc::new(World::new(Arc::clone(&options.scene)));

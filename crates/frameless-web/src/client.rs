@@ -1,0 +1,332 @@
+//! One client's connection: hears what its user does, and sends it as much of the newest picture as its link takes.
+//!
+//! One message is encoded at a time, for the newest picture there is when the link has room: nothing ever queues but what is on its way.
+
+mod outgoing;
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use axum::extract::ws::{CloseFrame, Message, WebSocket, close_code};
+use tokio::task::JoinHandle;
+use tokio::time::{MissedTickBehavior, interval, sleep_until, timeout};
+
+use crate::hub::{Event, HubHandle};
+use crate::mailbox::Mailbox;
+use crate::tiles::{Flow, Published};
+use crate::wire::{Ack, Said, StatusMessage, WireError};
+
+use outgoing::{Outgoing, Ready, Room};
+
+/// How often a client is asked whether it is still there, while it may stall.
+const PINGS: u32 = 3;
+/// Status while something changes.
+const STATUS: Duration = Duration::from_millis(250);
+/// Of those, one in so many at rest.
+const AT_REST: u32 = 4;
+
+/// Why a connection ends.
+enum End {
+    /// The other side has gone, or the server ends.
+    Gone,
+    /// It sent what must not be.
+    Invalid(WireError),
+    /// It has not moved for too long.
+    Stalled,
+}
+
+/// Runs until the client goes, does what it must not, or stalls.
+pub(crate) async fn serve(client: u32, socket: WebSocket, hub: HubHandle, stalled: Duration) {
+    let mailbox = Arc::new(Mailbox::default());
+    let join = Event::Join { client, mailbox: Arc::clone(&mailbox) };
+    if hub.events.send(join).await.is_err() {
+        return;
+    }
+    let events = hub.events.clone();
+    let mut connection = Connection::new(client, socket, mailbox, hub, stalled);
+    let end = connection.run().await;
+    // Fails if the hub has ended.
+    events.send(Event::Leave(client)).await.ok();
+    connection.close(end).await;
+}
+
+struct Connection {
+    client: u32,
+    socket: WebSocket,
+    mailbox: Arc<Mailbox>,
+    hub: HubHandle,
+    stalled: Duration,
+    flow: Flow,
+    // None while a message is being made.
+    outgoing: Option<Outgoing>,
+    making: Option<JoinHandle<Ready>>,
+    // There may be something to send.
+    look: bool,
+    look_at: Option<Instant>,
+    // The canvas is this picture, once all that was sent is drawn.
+    exact: Option<Arc<Published>>,
+    heard_at: Instant,
+    sent_bytes: u64,
+    status: StatusMeter,
+}
+
+/// When to send a status, and what was sent meanwhile.
+struct StatusMeter {
+    ticks: u32,
+    // Bytes sent in each of the last second's quarters.
+    quarters: [u64; 4],
+    counted: u64,
+    last_exact: Option<u32>,
+    was_sent: bool,
+}
+
+impl Connection {
+    fn new(
+        client: u32,
+        socket: WebSocket,
+        mailbox: Arc<Mailbox>,
+        hub: HubHandle,
+        stalled: Duration,
+    ) -> Connection {
+        let now = Instant::now();
+        let status = StatusMeter {
+            ticks: 0,
+            quarters: [0; 4],
+            counted: 0,
+            last_exact: None,
+            was_sent: false,
+        };
+        Connection {
+            client,
+            socket,
+            mailbox,
+            hub,
+            stalled,
+            flow: Flow::new(now),
+            outgoing: Some(Outgoing::new(now)),
+            making: None,
+            look: true,
+            look_at: None,
+            exact: None,
+            heard_at: now,
+            sent_bytes: 0,
+            status,
+        }
+    }
+
+    async fn run(&mut self) -> End {
+        let mut status = interval(STATUS);
+        status.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut ping = interval(self.stalled / PINGS);
+        let mut pictures = self.hub.pictures.clone();
+        let mailbox = Arc::clone(&self.mailbox);
+        loop {
+            self.make();
+            let later = self.look_at.filter(|_| self.making.is_none());
+            let outcome = tokio::select! {
+                message = self.socket.recv() => match message {
+                    Some(Ok(message)) => self.hear(message).await,
+                    Some(Err(_)) | None => Err(End::Gone),
+                },
+                ready = joined(&mut self.making), if self.making.is_some() => match ready {
+                    Some(ready) => self.send_tiles(ready).await,
+                    None => Err(End::Gone),
+                },
+                changed = pictures.changed() => {
+                    self.look = true;
+                    changed.map_err(|_| End::Gone)
+                }
+                text = mailbox.next() => match text {
+                    Some(text) => self.send(Message::text(&*text)).await,
+                    None => Err(End::Gone),
+                },
+                _ = status.tick() => self.send_status().await,
+                _ = ping.tick() => self.ping().await,
+                () = at(later), if later.is_some() => {
+                    self.look = true;
+                    Ok(())
+                }
+            };
+            if let Err(end) = outcome {
+                return end;
+            }
+        }
+    }
+
+    /// Begins to make a message, if there may be something to send and there is room for it.
+    fn make(&mut self) {
+        let room = self.flow.room();
+        if !self.look || room == 0 {
+            return;
+        }
+        let Some(picture) = self.hub.pictures.borrow().clone() else { return };
+        let Some(outgoing) = self.outgoing.take() else { return };
+        (self.look, self.look_at) = (false, None);
+        let room = Room {
+            bytes: room,
+            window: self.flow.window(),
+            client: self.client,
+            sequence: self.flow.next_sequence(),
+        };
+        let hub = self.hub.clone();
+        self.making = Some(tokio::task::spawn_blocking(move || {
+            let begin = Instant::now();
+            let ready = outgoing.make(picture, &room);
+            hub.painted(begin.elapsed());
+            ready
+        }));
+    }
+
+    async fn send_tiles(&mut self, ready: Ready) -> Result<(), End> {
+        let Ready { outgoing, picture, message, all_exact, wait } = ready;
+        self.outgoing = Some(outgoing);
+        let now = Instant::now();
+        self.look_at = wait.map(|wait| now + wait);
+        self.exact = all_exact.then_some(picture);
+        if let Some(message) = message {
+            // What else is there to send is seen when it has been sent.
+            self.look = true;
+            self.flow.send(message.len(), now);
+            self.send(Message::binary(message)).await?;
+        }
+        let exact = self.exact.as_ref().map(|picture| picture.number);
+        if exact.is_some() && exact != self.status.last_exact {
+            self.tell_status().await?;
+        }
+        Ok(())
+    }
+
+    async fn hear(&mut self, message: Message) -> Result<(), End> {
+        let now = Instant::now();
+        self.heard_at = now;
+        match message {
+            Message::Text(text) => {
+                let said = Said::parse(&text).map_err(End::Invalid)?;
+                let event = Event::Said(self.client, said);
+                self.hub.events.send(event).await.map_err(|_| End::Gone)
+            }
+            Message::Binary(bytes) => {
+                let Ack { sequence } = Ack::parse(&bytes).map_err(End::Invalid)?;
+                self.flow.acknowledge(sequence, now).map_err(|_| {
+                    let (what, wanted) = ("sequence number", "one that is on its way");
+                    End::Invalid(WireError::Value { what, wanted, came: sequence.to_string() })
+                })
+            }
+            Message::Ping(_) | Message::Pong(_) => Ok(()),
+            Message::Close(_) => Err(End::Gone),
+        }
+    }
+
+    async fn ping(&mut self) -> Result<(), End> {
+        let now = Instant::now();
+        let unanswered = self.flow.waiting_since().map_or(Duration::ZERO, |since| now - since);
+        if unanswered >= self.stalled || now - self.heard_at >= self.stalled {
+            return Err(End::Stalled);
+        }
+        self.send(Message::Ping(Default::default())).await
+    }
+
+    /// Told four times a second.
+    async fn send_status(&mut self) -> Result<(), End> {
+        let meter = &mut self.status;
+        let quarter = self.sent_bytes - meter.counted;
+        meter.counted = self.sent_bytes;
+        meter.quarters.rotate_left(1);
+        meter.quarters[3] = quarter;
+        meter.ticks += 1;
+        let at_rest = self.exact.is_some() && meter.was_sent && quarter <= MOST_AT_REST;
+        if at_rest && !meter.ticks.is_multiple_of(AT_REST) {
+            return Ok(());
+        }
+        self.tell_status().await
+    }
+
+    async fn tell_status(&mut self) -> Result<(), End> {
+        let newest = self.hub.pictures.borrow().clone();
+        let Some(newest) = newest else { return Ok(()) };
+        let exact = self.exact.as_ref().filter(|exact| exact.number == newest.number);
+        let message = {
+            let newest_status = self.hub.statuses.borrow();
+            let Some(status) = &newest_status.status else { return Ok(()) };
+            StatusMessage {
+                playing: newest_status.playing,
+                exact: exact.is_some(),
+                bytes_per_sec: self.status.quarters.iter().sum::<u64>() as u32,
+                generation: newest.generation,
+                picture: newest.number,
+                // Of no use to whoever has not all of it, and it costs a pass over the picture.
+                crc: exact.map_or(0, |exact| exact.crc()),
+                ..outgoing::status(status, newest.size.pixels())
+            }
+        };
+        self.status.last_exact = exact.map(|exact| exact.number);
+        self.status.was_sent = true;
+        self.send(Message::binary(message.to_bytes())).await
+    }
+
+    async fn send(&mut self, message: Message) -> Result<(), End> {
+        self.sent_bytes += message_bytes(&message);
+        match timeout(self.stalled, self.socket.send(message)).await {
+            Ok(Ok(())) => Ok(()),
+            Ok(Err(_)) => Err(End::Gone),
+            Err(_) => Err(End::Stalled),
+        }
+    }
+
+    /// Says why, if the other side may still hear it.
+    async fn close(mut self, end: End) {
+        let (code, reason) = match end {
+            End::Gone => (close_code::AWAY, String::new()),
+            End::Invalid(error) => (close_code::POLICY, error.to_string()),
+            End::Stalled => (close_code::AWAY, "not heard of for too long".to_owned()),
+        };
+        let frame = CloseFrame { code, reason: shortened(&reason).into() };
+        let farewell = self.socket.send(Message::Close(Some(frame)));
+        // A client that is gone does not matter any more.
+        drop(timeout(Duration::from_secs(1), farewell).await);
+    }
+}
+
+/// Less than this in a quarter of a second is no picture.
+const MOST_AT_REST: u64 = 200;
+
+/// With a WebSocket's header.
+fn message_bytes(message: &Message) -> u64 {
+    let payload = match message {
+        Message::Text(text) => text.len(),
+        Message::Binary(bytes) | Message::Ping(bytes) | Message::Pong(bytes) => bytes.len(),
+        Message::Close(_) => 0,
+    };
+    let header = match payload {
+        0..=125 => 2,
+        126..=0xffff => 4,
+        _ => 10,
+    };
+    (header + payload) as u64
+}
+
+/// A WebSocket's reason has at most 123 bytes.
+fn shortened(reason: &str) -> String {
+    let mut end = reason.len().min(120);
+    while !reason.is_char_boundary(end) {
+        end -= 1;
+    }
+    reason[..end].to_owned()
+}
+
+/// What a task has made, which is then forgotten; None if it failed.
+async fn joined(making: &mut Option<JoinHandle<Ready>>) -> Option<Ready> {
+    let ready = match making {
+        Some(task) => task.await.ok(),
+        None => std::future::pending().await,
+    };
+    *making = None;
+    ready
+}
+
+async fn at(instant: Option<Instant>) {
+    match instant {
+        Some(instant) => sleep_until(instant.into()).await,
+        None => std::future::pending().await,
+    }
+}

@@ -1,0 +1,137 @@
+//! The next message to a client: which tiles, and their bytes.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use frameless_session::{Drawn, Status};
+
+use crate::tiles::{self, Atlas, Published, SIDE, Seen};
+use crate::wire::{Codec, StatusMessage, TilesHeader};
+
+/// Before anything has been encoded, in bytes per tile: lossy, exact.
+const FIRST_GUESS: [f64; 2] = [500.0, 1500.0];
+/// Of the newest message in what a tile is expected to take.
+const LEARNING_RATE: f64 = 0.2;
+/// While something moves, so much is refined per byte that is sent of what moves.
+const REFINE_SHARE: f64 = 0.25;
+/// While something moves, the largest refinement in bytes: what moves waits for it.
+const MOST_REFINED: usize = 16 << 10;
+
+/// What a client has been sent, and what that took. Passed to a thread and back for every message.
+pub(super) struct Outgoing {
+    seen: Seen,
+    begun: Instant,
+    // Bytes per tile: lossy, exact.
+    cost: [f64; 2],
+    // Bytes that refinement may take while something moves.
+    credit: f64,
+    // Of atlases.
+    memory: Vec<u8>,
+}
+
+/// How much may be sent, and to whom.
+pub(super) struct Room {
+    pub(super) bytes: usize,
+    pub(super) window: usize,
+    pub(super) client: u32,
+    pub(super) sequence: u32,
+}
+
+/// A message, or none if there is nothing to say.
+pub(super) struct Ready {
+    pub(super) outgoing: Outgoing,
+    pub(super) picture: Arc<Published>,
+    pub(super) message: Option<Vec<u8>>,
+    /// The canvas is the picture, once everything before is drawn.
+    pub(super) all_exact: bool,
+    /// When to look again, if nothing changes before.
+    pub(super) wait: Option<Duration>,
+}
+
+impl Outgoing {
+    pub(super) fn new(now: Instant) -> Outgoing {
+        Outgoing {
+            seen: Seen::nothing(),
+            begun: now,
+            cost: FIRST_GUESS,
+            credit: 0.0,
+            memory: Vec::new(),
+        }
+    }
+
+    /// Chooses and encodes.
+    pub(super) fn make(mut self, picture: Arc<Published>, room: &Room) -> Ready {
+        let now_ms = self.begun.elapsed().as_millis() as u32 + 1;
+        let exact_bytes = if picture.calm { room.bytes } else { room.bytes.min(MOST_REFINED) };
+        let tiles = [
+            (room.bytes as f64 / self.cost[0]) as usize,
+            (exact_bytes as f64 / self.cost[1]) as usize,
+        ];
+        let refine = self.credit >= self.cost[1];
+        let chosen = self.seen.choose(&picture, now_ms, tiles, refine);
+        let wait = chosen.wait_ms.map(|ms| Duration::from_millis(ms.into()));
+        if chosen.tiles.is_empty() {
+            return Ready {
+                outgoing: self,
+                picture,
+                message: None,
+                all_exact: chosen.all_exact,
+                wait,
+            };
+        }
+        let grid = picture.grid();
+        let atlas =
+            Atlas::of(&grid, &chosen.tiles, &picture.rgba, std::mem::take(&mut self.memory));
+        let codec = if chosen.lossless { Codec::Png } else { Codec::Jpeg };
+        // An encoder refuses no atlas; were it so, the tiles would be due again.
+        let Ok(payload) = tiles::encode(codec, &atlas) else {
+            return Ready { outgoing: self, picture, message: None, all_exact: false, wait };
+        };
+        self.learn(chosen.lossless, chosen.tiles.len(), payload.len(), room.window);
+        self.seen.sent(&picture, &chosen, now_ms);
+        let header = TilesHeader {
+            codec,
+            lossless: chosen.lossless,
+            sequence: room.sequence,
+            generation: picture.generation,
+            width: picture.size.width as u16,
+            height: picture.size.height as u16,
+            side: SIDE as u16,
+            picture: picture.number,
+            input: picture.input_of(room.client),
+            columns: atlas.columns,
+            tiles: chosen.tiles,
+        };
+        let message = Some(header.to_bytes(&payload));
+        self.memory = atlas.rgb;
+        Ready { outgoing: self, picture, message, all_exact: false, wait }
+    }
+
+    fn learn(&mut self, lossless: bool, tiles: usize, bytes: usize, window: usize) {
+        let cost = &mut self.cost[usize::from(lossless)];
+        *cost += LEARNING_RATE * (bytes as f64 / tiles as f64 - *cost);
+        self.credit += match lossless {
+            true => -(bytes as f64),
+            false => REFINE_SHARE * bytes as f64,
+        };
+        self.credit = self.credit.clamp(0.0, window as f64);
+    }
+}
+
+/// What of a status does not depend on the client.
+pub(super) fn status(status: &Status, pixels: usize) -> StatusMessage {
+    StatusMessage {
+        overlay: match status.overlay {
+            None => 0,
+            Some(Drawn::HeatMap(_)) => 1,
+            Some(Drawn::Unknown) => 2,
+        },
+        samples_per_sec: status.samples_per_sec as f32,
+        pictures_per_sec: status.pictures_per_sec as f32,
+        mean_age_secs: status.ages.mean_secs as f32,
+        max_age_secs: status.ages.max_secs as f32,
+        unknown: status.ages.unknown as f32 / pixels as f32,
+        scene_secs: status.scene_secs,
+        ..StatusMessage::default()
+    }
+}

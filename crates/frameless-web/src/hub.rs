@@ -1,0 +1,393 @@
+//! Between the render loop and the clients: one thread that knows the camera, the settings and who drives.
+//!
+//! Clients tell it what their users do; it tells the loop, and hands every picture worth it to all of them at once. It waits for
+//! nobody: the newest picture replaces the one before, whoever has not taken that yet.
+
+mod events;
+mod inputs;
+mod opening;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use anyhow::bail;
+use frameless::Size;
+use frameless_session::{
+    Command, Drawn, Helm, Picture, RenderThread, Report, Session, Settings, Stage, Status,
+};
+use tokio::sync::{mpsc, watch};
+
+pub(crate) use events::{Event, HubHandle, LoopStatus, Upload, UploadRefused};
+use inputs::Inputs;
+use opening::Opening;
+
+use crate::legend;
+use crate::mailbox::Kind;
+use crate::roster::Roster;
+use crate::settings;
+use crate::show::{Scenes, Show};
+use crate::tiles::{Published, Publisher, Taken};
+use crate::wire::{Level, Said, Told};
+
+/// While nothing happens a picture is made this often, in case something does. The first one after something has is made at once.
+const CALM_INTERVAL: Duration = Duration::from_millis(50);
+/// Nothing that is seen has changed and nobody has done anything for so long.
+const CALM_AFTER: Duration = Duration::from_secs(1);
+/// A client that is told why it may not act is not told again for so long.
+const BETWEEN_REFUSALS: Duration = Duration::from_secs(2);
+
+/// The thread's state.
+pub(crate) struct Hub<W: Send + 'static> {
+    render: RenderThread<W>,
+    helm: Helm,
+    scenes: Option<Scenes<W>>,
+    settings: Settings,
+    size: Size,
+    playing: bool,
+    speed: f64,
+    scene_secs: f64,
+    roster: Roster,
+    // The place for the picture in each client's page.
+    places: BTreeMap<u32, [u32; 2]>,
+    refused: BTreeMap<u32, Instant>,
+    inputs: Inputs,
+    view_changed: bool,
+    publisher: Publisher,
+    overlay: Option<Drawn>,
+    // Memory for the next picture; none while one is being made.
+    memory: Option<Vec<[u8; 4]>>,
+    acted_at: Instant,
+    painted: Arc<AtomicU64>,
+    pictures: watch::Sender<Option<Arc<Published>>>,
+    statuses: watch::Sender<LoopStatus>,
+    opening: Option<Opening<W>>,
+    told: Option<Told>,
+    handle: HubHandle,
+}
+
+/// Starts the loop and the hub's thread, which ends with [`Event::Stop`] or with the loop.
+pub(crate) fn start<S>(
+    show: Show<S>,
+    runtime: tokio::runtime::Handle,
+) -> anyhow::Result<(HubHandle, std::thread::JoinHandle<anyhow::Result<()>>)>
+where
+    S: Stage + Send + 'static,
+{
+    let (events, inbox) = mpsc::channel(events::MOST_WAITING);
+    let (pictures, watched) = watch::channel(None);
+    let (statuses, status) = watch::channel(LoopStatus::default());
+    let painted = Arc::new(AtomicU64::new(0));
+    let handle = HubHandle {
+        events: events.clone(),
+        pictures: watched,
+        statuses: status,
+        painted: Arc::clone(&painted),
+    };
+    let Show { session, helm, scenes } = show;
+    let (settings, size) = (*session.settings(), session.size());
+    let render = run_loop(session, events)?;
+    let hub = Hub {
+        render,
+        helm,
+        scenes,
+        settings,
+        size,
+        playing: true,
+        speed: 1.0,
+        scene_secs: 0.0,
+        roster: Roster::default(),
+        places: BTreeMap::new(),
+        refused: BTreeMap::new(),
+        inputs: Inputs::default(),
+        view_changed: true,
+        publisher: Publisher::new(Instant::now()),
+        overlay: None,
+        memory: Some(Vec::new()),
+        acted_at: Instant::now(),
+        painted,
+        pictures,
+        statuses,
+        opening: None,
+        told: None,
+        handle: handle.clone(),
+    };
+    let thread = std::thread::Builder::new()
+        .name("web hub".to_owned())
+        .spawn(move || hub.run(inbox, &runtime))?;
+    Ok((handle, thread))
+}
+
+fn run_loop<S: Stage + Send + 'static>(
+    session: Session<S>,
+    events: mpsc::Sender<Event>,
+) -> std::io::Result<RenderThread<S::World>> {
+    // Where the inbox is full the hub looks at the loop's reports after what is in it.
+    RenderThread::start(session, move || drop(events.try_send(Event::Woken)))
+}
+
+impl<W: Send + 'static> Hub<W> {
+    fn run(
+        mut self,
+        mut inbox: mpsc::Receiver<Event>,
+        runtime: &tokio::runtime::Handle,
+    ) -> anyhow::Result<()> {
+        let ended = loop {
+            let wait = self.wants_picture_in();
+            let next = runtime.block_on(async {
+                match wait {
+                    None => inbox.recv().await,
+                    // Too long is a second too long for nobody: an event of no news.
+                    Some(wait) => {
+                        tokio::time::timeout(wait, inbox.recv()).await.unwrap_or(Some(Event::Woken))
+                    }
+                }
+            });
+            let mut events = next.into_iter().chain(std::iter::from_fn(|| inbox.try_recv().ok()));
+            if events.any(|event| !self.handle_event(event)) {
+                break Ok(());
+            }
+            if let Err(error) = self.hear_loop() {
+                self.roster.notice(Level::Error, error.to_string());
+                break Err(error);
+            }
+            self.hear_opening();
+            self.tell_loop();
+            self.tell_state();
+        };
+        self.roster.close();
+        ended
+    }
+
+    /// False: it is time to end.
+    fn handle_event(&mut self, event: Event) -> bool {
+        match event {
+            Event::Woken => {}
+            Event::Stop => return false,
+            Event::Join { client, mailbox } => {
+                mailbox.put(Kind::Welcome, self.welcome(client).to_json().into());
+                mailbox.put(Kind::Scene, self.scene().to_json().into());
+                let legend = legend::told(self.overlay.as_ref());
+                mailbox.put(Kind::Legend, legend.to_json().into());
+                mailbox.put(Kind::State, self.state().to_json().into());
+                self.roster.join(client, mailbox);
+                self.act();
+            }
+            Event::Leave(client) => {
+                self.roster.leave(client);
+                self.places.remove(&client);
+                self.refused.remove(&client);
+                self.inputs.forget(client);
+            }
+            Event::Said(client, said) => self.hear(client, said),
+            Event::Upload(upload) => self.upload(upload),
+        }
+        true
+    }
+
+    /// Somebody does something: the next picture is wanted at once.
+    fn act(&mut self) {
+        self.acted_at = Instant::now();
+    }
+
+    fn hear(&mut self, client: u32, said: Said) {
+        match said {
+            Said::Size { place } => {
+                self.places.insert(client, place);
+                self.follow_place();
+                return;
+            }
+            Said::Drive { on: true } => {
+                if let Some(before) = self.roster.take(client) {
+                    let text = format!("client {client} drives now");
+                    self.roster.notice_to(before, Level::Info, text);
+                }
+                self.follow_place();
+                return;
+            }
+            Said::Drive { on: false } => return self.roster.release(client),
+            _ if !self.roster.may_act(client) => return self.refuse(client),
+            _ => {}
+        }
+        self.act();
+        let input = said.input();
+        self.obey(client, said);
+        self.inputs.came(client, input);
+    }
+
+    fn obey(&mut self, client: u32, said: Said) {
+        match said {
+            Said::Camera { orbit, pan, zoom, fly, .. } => {
+                self.helm.steer(self.scene_secs, |camera| {
+                    inputs::steer(camera, orbit, pan, zoom, fly);
+                });
+                self.view_changed = true;
+            }
+            Said::LookThrough { camera, .. } => {
+                let cameras = self.helm.scene().cameras.len();
+                if (camera as usize) < cameras {
+                    self.helm.look_through(camera);
+                    self.view_changed = true;
+                } else {
+                    let text = format!("there is no camera {camera}: the scene has {cameras}");
+                    self.roster.notice_to(client, Level::Error, text);
+                }
+            }
+            Said::ComeBack { .. } => {
+                self.helm.come_back();
+                self.view_changed = true;
+            }
+            Said::Play { on, .. } => {
+                self.playing = on;
+                self.render.send(Command::Play(on));
+            }
+            Said::Seek { secs, .. } => self.render.send(Command::Seek(secs)),
+            Said::Speed { speed, .. } => {
+                self.speed = speed;
+                self.render.send(Command::Speed(speed));
+            }
+            Said::Settings(change) => match settings::changed(&self.settings, &change) {
+                Ok(settings) => {
+                    self.settings = settings;
+                    self.render.send(Command::Settings(settings));
+                    self.follow_place();
+                }
+                Err(text) => self.roster.notice_to(client, Level::Error, text),
+            },
+            Said::Open { name } => self.open_builtin(client, &name),
+            // Done before.
+            Said::Size { .. } | Said::Drive { .. } => {}
+        }
+    }
+
+    fn refuse(&mut self, client: u32) {
+        let now = Instant::now();
+        let lately = self.refused.get(&client);
+        if lately.is_some_and(|at| now.duration_since(*at) < BETWEEN_REFUSALS) {
+            return;
+        }
+        self.refused.insert(client, now);
+        if let Some(driver) = self.roster.driver() {
+            let text = format!("client {driver} drives; take the helm first");
+            self.roster.notice_to(client, Level::Error, text);
+        }
+    }
+
+    /// The picture is as large as the driver's page has room for.
+    fn follow_place(&mut self) {
+        let place = self.roster.driver().and_then(|driver| self.places.get(&driver));
+        let Some(&place) = place else { return };
+        let size = settings::size_in(&self.settings, place);
+        if size != self.size {
+            self.size = size;
+            self.render.send(Command::Size(size));
+            self.act();
+        }
+    }
+
+    /// What the clients' inputs come to, and a wish for a picture.
+    fn tell_loop(&mut self) {
+        if std::mem::take(&mut self.view_changed) {
+            self.render.send(Command::View(self.helm.view()));
+        }
+        if let Some(mark) = self.inputs.mark() {
+            self.render.send(Command::Mark(mark));
+        }
+        if self.wants_picture_in() == Some(Duration::ZERO)
+            && let Some(memory) = self.memory.take()
+        {
+            let paint_secs = 1e-9 * self.painted.swap(0, Ordering::Relaxed) as f64;
+            self.render.send(Command::WantPicture { memory, paint_secs });
+        }
+    }
+
+    /// None: not before something happens.
+    fn wants_picture_in(&self) -> Option<Duration> {
+        if self.memory.is_none() || self.roster.is_empty() {
+            return None;
+        }
+        let now = Instant::now();
+        let quiet = now.duration_since(self.acted_at) >= CALM_AFTER
+            && self.publisher.quiet_for(now) >= CALM_AFTER;
+        let pause = if quiet { CALM_INTERVAL } else { Duration::ZERO };
+        Some((self.publisher.taken_at() + pause).saturating_duration_since(now))
+    }
+
+    fn hear_loop(&mut self) -> anyhow::Result<()> {
+        loop {
+            match self.render.report() {
+                Ok(None) => return Ok(()),
+                Ok(Some(Report::Picture(picture))) => self.take(picture),
+                Ok(Some(Report::Error(text))) => self.roster.notice(Level::Error, text),
+                Err(_) => bail!("the renderer has stopped; please report what you did"),
+            }
+        }
+    }
+
+    fn take(&mut self, picture: Picture) {
+        self.hear_status(&picture.status);
+        let new_input = self.inputs.shown_by(picture.mark);
+        let taken = self.publisher.take(picture, self.inputs.shown(), new_input, Instant::now());
+        match taken {
+            Taken::Same(memory) => self.memory = Some(memory),
+            Taken::New(published) => {
+                let before = self.pictures.send_replace(Some(published));
+                // Its memory, unless a client is still at it.
+                let memory = before.and_then(Arc::into_inner).map(|published| published.rgba);
+                self.memory = Some(memory.unwrap_or_default());
+            }
+        }
+    }
+
+    fn hear_status(&mut self, status: &Status) {
+        self.scene_secs = status.scene_secs;
+        if status.overlay != self.overlay {
+            self.overlay.clone_from(&status.overlay);
+            self.roster.put(Kind::Legend, &legend::told(self.overlay.as_ref()));
+        }
+        let (status, playing) = (Some(status.clone()), self.playing);
+        self.statuses.send_replace(LoopStatus { status, playing });
+    }
+
+    fn tell_state(&mut self) {
+        let state = self.state();
+        if self.told.as_ref() != Some(&state) {
+            self.roster.put(Kind::State, &state);
+            self.told = Some(state);
+        }
+    }
+
+    fn welcome(&self, client: u32) -> Told {
+        legend::welcome(client, self.scenes.as_ref().map(|scenes| scenes.limits.file_bytes))
+    }
+
+    fn scene(&self) -> Told {
+        let scene = self.helm.scene();
+        let name = |(index, camera): (usize, &frameless_scene::Camera)| match &*camera.name {
+            "" => format!("camera {index}"),
+            name => format!("camera {index}: {name}"),
+        };
+        Told::Scene {
+            name: scene.name.clone(),
+            notes: scene.notes.clone(),
+            warnings: scene.warnings.clone(),
+            duration_secs: scene.animation.duration_secs,
+            cameras: scene.cameras.iter().enumerate().map(name).collect(),
+        }
+    }
+
+    fn state(&self) -> Told {
+        Told::State {
+            driver: self.roster.driver(),
+            clients: self.roster.len(),
+            playing: self.playing,
+            speed: self.speed,
+            camera: self.helm.through(),
+            loading: self.opening.as_ref().map(Opening::describe),
+            width: self.size.width,
+            height: self.size.height,
+            settings: settings::state(&self.settings),
+        }
+    }
+}

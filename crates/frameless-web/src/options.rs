@@ -1,0 +1,209 @@
+//! Where the server listens, and what it allows.
+
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+
+/// The port unless another is asked for.
+pub const DEFAULT_PORT: u16 = 8420;
+/// The largest upload unless told otherwise, in bytes.
+pub const DEFAULT_UPLOAD_BYTES: u64 = 256 << 20;
+
+/// Where the server listens, and what it allows.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Where to listen; port 0: any free one.
+    pub address: SocketAddr,
+    /// Further names or addresses under which browsers reach this machine, without port.
+    pub hosts: Vec<String>,
+    /// Certificate chain and private key, as PEM files.
+    pub tls: Option<TlsFiles>,
+    /// Another address than loopback without TLS.
+    pub insecure: bool,
+    /// Where the secret is kept over restarts; none: a new one each time.
+    pub key_file: Option<PathBuf>,
+    /// An origin (`http://localhost:8888`) whose pages may show ours in a frame.
+    pub allow_frame: Option<String>,
+    /// The largest upload.
+    pub upload_bytes: u64,
+    /// The most clients at once.
+    pub clients: usize,
+    /// A client that takes nothing, or is not heard of, for so long is dropped.
+    pub stalled: Duration,
+}
+
+/// PEM files.
+#[derive(Clone, Debug)]
+pub struct TlsFiles {
+    /// The certificate, then those that lead to its root.
+    pub certificates: PathBuf,
+    /// Its private key.
+    pub key: PathBuf,
+}
+
+impl Default for Options {
+    /// This machine only.
+    fn default() -> Options {
+        Options {
+            address: SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), DEFAULT_PORT),
+            hosts: Vec::new(),
+            tls: None,
+            insecure: false,
+            key_file: None,
+            allow_frame: None,
+            upload_bytes: DEFAULT_UPLOAD_BYTES,
+            clients: 64,
+            stalled: Duration::from_secs(30),
+        }
+    }
+}
+
+impl Options {
+    /// Refuses what is not safe, or would lead to an address that nobody can open.
+    ///
+    /// # Errors
+    /// With what to say instead.
+    pub(crate) fn check(&self) -> anyhow::Result<()> {
+        let ip = self.address.ip();
+        if !ip.is_loopback() && self.tls.is_none() && !self.insecure {
+            bail!(
+                "{ip}: everybody on the way could read along and steer; give --tls-cert and --tls-key, or go through \
+                 `ssh -L {port}:localhost:{port}` to the default address, or say --insecure",
+                port = self.address.port()
+            );
+        }
+        if ip.is_unspecified() && self.hosts.is_empty() {
+            bail!(
+                "{ip} is no address that a browser can open: say with --host under which name or address this machine is reached"
+            );
+        }
+        for host in &self.hosts {
+            let is_name = !host.is_empty()
+                && host
+                    .bytes()
+                    .all(|byte| byte.is_ascii_alphanumeric() || b"-._[:]".contains(&byte));
+            if !is_name || host.contains(':') != host.starts_with('[') {
+                bail!(
+                    "--host {host}: wanted a name or an address without a port, such as render.example.org or [2001:db8::1]"
+                );
+            }
+        }
+        if let Some(origin) = &self.allow_frame {
+            let rest = origin.strip_prefix("http://").or(origin.strip_prefix("https://"));
+            let is_origin = rest.is_some_and(|host| {
+                !host.is_empty()
+                    && host
+                        .bytes()
+                        .all(|byte| byte.is_ascii_alphanumeric() || b"-.[:]*".contains(&byte))
+            });
+            if !is_origin {
+                bail!("--allow-frame {origin}: wanted an origin such as http://localhost:8888");
+            }
+        }
+        Ok(())
+    }
+
+    /// The names under which it is reached, in lower case, the one for its URL first.
+    pub(crate) fn names(&self) -> Vec<String> {
+        let ip = self.address.ip();
+        let mut names: Vec<String> =
+            self.hosts.iter().map(|host| host.to_ascii_lowercase()).collect();
+        if !ip.is_unspecified() {
+            names.push(in_url(ip));
+        }
+        if ip.is_loopback() || ip.is_unspecified() {
+            names.extend(["127.0.0.1", "localhost", "[::1]"].map(str::to_owned));
+        }
+        names
+    }
+}
+
+fn in_url(ip: IpAddr) -> String {
+    match ip {
+        IpAddr::V4(ip) => ip.to_string(),
+        IpAddr::V6(ip) => format!("[{ip}]"),
+    }
+}
+
+impl TlsFiles {
+    /// Certificates and key, ready to be used.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or they do not belong together.
+    pub(crate) fn config(&self) -> anyhow::Result<tokio_rustls::rustls::ServerConfig> {
+        use tokio_rustls::rustls::pki_types::pem::PemObject;
+        use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
+        let shown = self.certificates.display();
+        let certificates = CertificateDer::pem_file_iter(&self.certificates)
+            .and_then(Iterator::collect::<Result<Vec<_>, _>>)
+            .with_context(|| format!("cannot read certificates from {shown}"))?;
+        if certificates.is_empty() {
+            bail!("{shown}: wanted certificates as PEM, came none");
+        }
+        let key = PrivateKeyDer::from_pem_file(&self.key)
+            .with_context(|| format!("cannot read a private key from {}", self.key.display()))?;
+        let provider = tokio_rustls::rustls::crypto::ring::default_provider();
+        tokio_rustls::rustls::ServerConfig::builder_with_provider(provider.into())
+            .with_safe_default_protocol_versions()?
+            .with_no_client_auth()
+            .with_single_cert(certificates, key)
+            .with_context(|| format!("{shown} and {} cannot be used", self.key.display()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(address: &str) -> Options {
+        Options { address: address.parse().unwrap(), ..Options::default() }
+    }
+
+    #[test]
+    fn only_loopback_needs_no_tls() {
+        for fine in ["127.0.0.1:1", "127.5.5.5:1", "[::1]:1"] {
+            at(fine).check().unwrap();
+        }
+        for other in
+            ["192.168.1.2:1", "0.0.0.0:1", "[::]:1", "[2001:db8::1]:1", "[::ffff:7f00:1]:1"]
+        {
+            let error = at(other).check().unwrap_err().to_string();
+            assert!(error.contains("--tls-cert") && error.contains("--insecure"), "{error}");
+        }
+        Options { insecure: true, ..at("192.168.1.2:1") }.check().unwrap();
+    }
+
+    #[test]
+    fn every_address_needs_a_name() {
+        let anywhere = Options { insecure: true, ..at("0.0.0.0:1") };
+        assert!(anywhere.check().unwrap_err().to_string().contains("--host"));
+        let named = Options { hosts: vec!["Render.example".to_owned()], ..anywhere };
+        named.check().unwrap();
+        assert_eq!(named.names()[0], "render.example");
+        for bad in ["", "a b", "http://a", "a:80", "a/b"] {
+            assert!(
+                Options { hosts: vec![bad.to_owned()], ..at("127.0.0.1:1") }.check().is_err(),
+                "{bad}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_frames_origin_cannot_smuggle_a_policy_in() {
+        let allowing =
+            |origin: &str| Options { allow_frame: Some(origin.to_owned()), ..Options::default() };
+        allowing("http://localhost:8888").check().unwrap();
+        for bad in [
+            "*",
+            "localhost",
+            "http://",
+            "http://a; script-src *",
+            "http://a\r\nX: y",
+            "http://a b",
+        ] {
+            assert!(allowing(bad).check().is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,27 @@
+//! What is served.
+
+use std::sync::Arc;
+
+use frameless_scene::{Limits, Scene};
+use frameless_session::{Helm, Session, Stage};
+
+/// A session, and the camera on it.
+pub struct Show<S: Stage> {
+    /// The loop, not yet running.
+    pub session: Session<S>,
+    /// From where it is looked at first.
+    pub helm: Helm,
+    /// How other scenes are opened; none: the renderer has but its own.
+    pub scenes: Option<Scenes<S::World>>,
+}
+
+/// How other scenes are opened.
+pub struct Scenes<W> {
+    /// For uploads.
+    pub limits: Limits,
+    /// A scene made ready for the renderer; called in a thread of its own.
+    pub prepare: Prepare<W>,
+}
+
+/// Makes a scene ready for a renderer.
+pub type Prepare<W> = Arc<dyn Fn(&Arc<Scene>) -> W + Send + Sync>;

@@ -1,0 +1,15 @@
+//! Which part of the picture a client is sent next, how it is written, and how much may be on its way.
+
+mod atlas;
+mod codec;
+mod flow;
+mod grid;
+mod publish;
+mod seen;
+
+pub(crate) use atlas::Atlas;
+pub(crate) use codec::encode;
+pub(crate) use flow::Flow;
+pub(crate) use grid::{Grid, SIDE};
+pub(crate) use publish::{Published, Publisher, Taken};
+pub(crate) use seen::Seen;

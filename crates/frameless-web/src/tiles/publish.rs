@@ -1,0 +1,300 @@
+//! Pictures as the clients see them: only those in which something changed, with what changed in them.
+//!
+//! What rests is refined for seconds by differences that nobody sees. Were each of those pictures published, no client would ever have
+//! *the* picture: so a picture in which no change can be seen is published only twice a second.
+
+use std::hash::{BuildHasher, Hasher};
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+use foldhash::quality::FixedState;
+use frameless::Size;
+use frameless_session::Picture;
+
+use super::Grid;
+
+/// A change of a tile that is seen: mean squared difference of its pixels (Σ over the channels, 8 bits each). A pixel in a hundred
+/// that is off by six steps in each channel, or one that is off by thirty.
+pub(crate) const SEEN: f64 = 1.0;
+/// What nobody sees is published this often.
+const UNSEEN_INTERVAL: Duration = Duration::from_millis(500);
+/// Without a change that is seen for so long the picture is calm.
+const CALM: Duration = Duration::from_millis(150);
+
+/// A picture with what is known of its tiles.
+pub(crate) struct Published {
+    /// From 1, growing.
+    pub(crate) number: u32,
+    /// Grows with every change of size.
+    pub(crate) generation: u32,
+    /// Width and height.
+    pub(crate) size: Size,
+    /// sRGB-encoded, row-major.
+    pub(crate) rgba: Vec<[u8; 4]>,
+    /// Of the bytes of each tile: equal digests, equal tiles.
+    pub(crate) digests: Vec<u64>,
+    /// Per tile: squared differences from one published picture to the next, summed over all since the generation began.
+    pub(crate) change_sums: Vec<u64>,
+    /// Nothing that is seen has changed lately.
+    pub(crate) calm: bool,
+    /// Pairs of client and its last input that the picture shows.
+    pub(crate) inputs: Vec<(u32, u32)>,
+    crc: OnceLock<u32>,
+}
+
+impl Published {
+    /// Its tiles.
+    pub(crate) fn grid(&self) -> Grid {
+        Grid::new(self.size)
+    }
+
+    /// The last of the client's inputs that it shows; 0: none.
+    pub(crate) fn input_of(&self, client: u32) -> u32 {
+        self.inputs.iter().find(|(of, _)| *of == client).map_or(0, |(_, input)| *input)
+    }
+
+    /// CRC-32 of R G B of all pixels; worked out when it is asked for first.
+    pub(crate) fn crc(&self) -> u32 {
+        *self.crc.get_or_init(|| {
+            let mut hasher = crc32fast::Hasher::new();
+            let mut row = Vec::with_capacity(3 * self.size.width as usize);
+            for pixels in self.rgba.chunks(self.size.width as usize) {
+                row.clear();
+                row.extend(pixels.iter().flat_map(|&[r, g, b, _]| [r, g, b]));
+                hasher.update(&row);
+            }
+            hasher.finalize()
+        })
+    }
+}
+
+/// What became of a picture.
+pub(crate) enum Taken {
+    /// It is to be shown.
+    New(Arc<Published>),
+    /// The last one will do; the picture's memory.
+    Same(Vec<[u8; 4]>),
+}
+
+/// Decides which pictures are published.
+pub(crate) struct Publisher {
+    last: Option<Arc<Published>>,
+    taken_at: Instant,
+    published_at: Instant,
+    seen_at: Instant,
+}
+
+impl Publisher {
+    pub(crate) fn new(now: Instant) -> Publisher {
+        Publisher { last: None, taken_at: now, published_at: now, seen_at: now }
+    }
+
+    /// When the last picture came, published or not.
+    pub(crate) fn taken_at(&self) -> Instant {
+        self.taken_at
+    }
+
+    /// For how long nothing that is seen has changed.
+    pub(crate) fn quiet_for(&self, now: Instant) -> Duration {
+        now.saturating_duration_since(self.seen_at)
+    }
+
+    /// Compares the picture with the last one that was published. With `new_input` it is published in any case if anything differs.
+    pub(crate) fn take(
+        &mut self,
+        picture: Picture,
+        inputs: Vec<(u32, u32)>,
+        new_input: bool,
+        now: Instant,
+    ) -> Taken {
+        self.taken_at = now;
+        let other_size = self.last.take_if(|last| last.size != picture.size);
+        let generation = match (&self.last, other_size) {
+            (Some(last), _) => last.generation,
+            (None, Some(other)) => other.generation.wrapping_add(1),
+            (None, None) => 1,
+        };
+        let Some(last) = &self.last else {
+            let published = first(picture, generation, inputs);
+            return self.publish(published, now);
+        };
+        let grid = last.grid();
+        let differences: Vec<u64> = (0..grid.len())
+            .map(|tile| difference(&grid, tile, &last.rgba, &picture.rgba))
+            .collect();
+        let differs = differences.iter().any(|&difference| difference > 0);
+        let is_seen = differences
+            .iter()
+            .enumerate()
+            .any(|(tile, &sum)| sum as f64 >= SEEN * f64::from(grid.pixels(tile)));
+        if is_seen {
+            self.seen_at = now;
+        }
+        let due = now.duration_since(self.published_at) >= UNSEEN_INTERVAL;
+        if !(is_seen || differs && (due || new_input)) {
+            return Taken::Same(picture.rgba);
+        }
+        let (mut digests, mut change_sums) = (last.digests.clone(), last.change_sums.clone());
+        for (tile, difference) in differences.into_iter().enumerate().filter(|(_, sum)| *sum > 0) {
+            digests[tile] = digest(&grid, tile, &picture.rgba);
+            change_sums[tile] += difference;
+        }
+        let published = Published {
+            number: last.number.wrapping_add(1),
+            generation,
+            size: picture.size,
+            rgba: picture.rgba,
+            digests,
+            change_sums,
+            calm: self.quiet_for(now) >= CALM,
+            inputs,
+            crc: OnceLock::new(),
+        };
+        self.publish(published, now)
+    }
+
+    fn publish(&mut self, mut published: Published, now: Instant) -> Taken {
+        if self.last.is_none() {
+            self.seen_at = now;
+            published.calm = false;
+        }
+        self.published_at = now;
+        let published = Arc::new(published);
+        self.last = Some(Arc::clone(&published));
+        Taken::New(published)
+    }
+}
+
+/// Of a generation.
+fn first(picture: Picture, generation: u32, inputs: Vec<(u32, u32)>) -> Published {
+    let grid = Grid::new(picture.size);
+    Published {
+        // Numbers need not be without gaps: a generation begins high above the last one's.
+        number: generation.wrapping_shl(20).max(1),
+        generation,
+        size: picture.size,
+        digests: (0..grid.len()).map(|tile| digest(&grid, tile, &picture.rgba)).collect(),
+        change_sums: vec![0; grid.len()],
+        rgba: picture.rgba,
+        calm: false,
+        inputs,
+        crc: OnceLock::new(),
+    }
+}
+
+/// Squared differences of a tile's pixels, summed over the channels.
+fn difference(grid: &Grid, tile: usize, before: &[[u8; 4]], after: &[[u8; 4]]) -> u64 {
+    let of_row = |row: std::ops::Range<usize>| {
+        let (before, after) = (&before[row.clone()], &after[row]);
+        if before == after {
+            return 0;
+        }
+        let squares = before.as_flattened().iter().zip(after.as_flattened()).map(|(&a, &b)| {
+            let difference = u32::from(a.abs_diff(b));
+            difference * difference
+        });
+        u64::from(squares.sum::<u32>())
+    };
+    grid.rows(tile).map(of_row).sum()
+}
+
+fn digest(grid: &Grid, tile: usize, rgba: &[[u8; 4]]) -> u64 {
+    let mut hasher = FixedState::with_seed(0).build_hasher();
+    grid.rows(tile).for_each(|row| hasher.write(rgba[row].as_flattened()));
+    hasher.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use frameless_session::{Ages, Status};
+
+    use super::*;
+
+    pub(crate) fn picture(size: Size, rgba: Vec<[u8; 4]>) -> Picture {
+        let status = Status {
+            scene_secs: 0.0,
+            samples_per_sec: 0.0,
+            pictures_per_sec: 0.0,
+            ages: Ages::default(),
+            overlay: None,
+        };
+        Picture { size, rgba, mark: 0, status }
+    }
+
+    const SIZE: Size = Size { width: 70, height: 40 };
+
+    fn grey(level: u8) -> Picture {
+        picture(SIZE, vec![[level, level, level, 255]; SIZE.pixels()])
+    }
+
+    fn new(taken: Taken) -> Arc<Published> {
+        match taken {
+            Taken::New(published) => published,
+            Taken::Same(_) => panic!("not published"),
+        }
+    }
+
+    #[test]
+    fn what_is_seen_is_published_at_once_and_the_same_never() {
+        let now = Instant::now();
+        let mut publisher = Publisher::new(now);
+        let first = new(publisher.take(grey(10), Vec::new(), false, now));
+        let mut other = grey(10);
+        other.rgba[5][0] = 90;
+        let second = new(publisher.take(other, Vec::new(), false, now));
+        assert!(second.number > first.number);
+        assert_ne!(second.digests[0], first.digests[0]);
+        assert_eq!(second.digests[1..], first.digests[1..]);
+        assert_eq!(second.change_sums, [6400, 0, 0, 0, 0, 0]);
+        let mut same = grey(10);
+        same.rgba[5][0] = 90;
+        let later = now + Duration::from_secs(60);
+        assert!(matches!(publisher.take(same, Vec::new(), true, later), Taken::Same(_)));
+    }
+
+    #[test]
+    fn what_nobody_sees_waits_half_a_second_and_still_comes() {
+        let now = Instant::now();
+        let mut publisher = Publisher::new(now);
+        new(publisher.take(grey(10), Vec::new(), false, now));
+        let one_step = || {
+            let mut picture = grey(10);
+            picture.rgba[7] = [11, 10, 10, 255];
+            picture
+        };
+        let at = |ms| now + Duration::from_millis(ms);
+        assert!(matches!(publisher.take(one_step(), Vec::new(), false, at(100)), Taken::Same(_)));
+        let published = new(publisher.take(one_step(), Vec::new(), false, at(510)));
+        assert!(published.calm);
+    }
+
+    #[test]
+    fn a_slow_fade_is_seen_before_half_a_second() {
+        let now = Instant::now();
+        let mut publisher = Publisher::new(now);
+        new(publisher.take(grey(10), Vec::new(), false, now));
+        // One step in each channel: 3 ≥ SEEN.
+        assert!(!new(publisher.take(grey(11), Vec::new(), false, now)).calm);
+    }
+
+    #[test]
+    fn another_size_is_another_generation() {
+        let now = Instant::now();
+        let mut publisher = Publisher::new(now);
+        let first = new(publisher.take(grey(10), Vec::new(), false, now));
+        let small = picture(Size::new(1, 1), vec![[0, 0, 0, 255]]);
+        let second = new(publisher.take(small, Vec::new(), false, now));
+        assert!(second.generation > first.generation && second.number > first.number);
+        assert_eq!(second.digests.len(), 1);
+    }
+
+    #[test]
+    fn the_checksum_is_that_of_the_specification() {
+        let now = Instant::now();
+        // "123456789", whose CRC-32 is known.
+        let rgba = vec![*b"123\xff", *b"456\xff", *b"789\xff"];
+        let three = picture(Size::new(1, 3), rgba);
+        let published = new(Publisher::new(now).take(three, Vec::new(), false, now));
+        assert_eq!(published.crc(), 0xcbf4_3926);
+    }
+}

@@ -1,0 +1,201 @@
+//! What a client's canvas comes to show.
+
+use std::io::{Read, Write};
+use std::time::{Duration, Instant};
+
+use frameless::Size;
+
+use crate::support::{Client, PATIENCE, Received, options, start, start_at};
+
+#[test]
+fn at_rest_the_canvas_is_the_servers_picture_and_then_nothing_is_sent() {
+    // Not a multiple of the tile's side.
+    let running = start_at(options(), Size::new(170, 101));
+    let mut client = Client::connect(&running);
+    client.say(r#"{"type": "play", "on": false}"#);
+    // Antialiasing goes on for a while: until it has ended, pictures of the same number stay.
+    let mut last = client.exact();
+    loop {
+        let next = client.exact();
+        if next.picture == last.picture {
+            break;
+        }
+        last = next;
+    }
+    let answer = running.get("/picture.png");
+    assert_eq!(answer.status, 200);
+    let server = image::load_from_memory(&answer.body).expect("a picture").to_rgb8();
+    assert_eq!((server.width(), server.height()), (170, 101));
+    assert_eq!(answer.header("x-picture"), Some(&*last.picture.to_string()));
+    assert_eq!(client.canvas, server);
+
+    let (begin, before) = (Instant::now(), client.bytes);
+    let mut beats = 0;
+    while begin.elapsed() < Duration::from_secs(4) {
+        match client.receive(Duration::from_millis(200)) {
+            Received::Tiles(tiles) => panic!("something has changed: {tiles:?}"),
+            Received::Status(status) => beats += u32::from(status.exact),
+            _ => {}
+        }
+    }
+    let per_sec = (client.bytes - before) as f64 / begin.elapsed().as_secs_f64();
+    assert!(per_sec <= 200.0, "{per_sec} bytes/s at rest");
+    assert!(beats >= 3, "{beats} heartbeats in 4 s");
+}
+
+#[test]
+fn what_moves_is_sent_first_and_not_all_of_it() {
+    let running = start_at(options(), Size::new(256, 192));
+    let mut client = Client::connect(&running);
+    let (mut all, mut few) = (0, 0);
+    let end = Instant::now() + Duration::from_secs(4);
+    while Instant::now() < end {
+        if let Received::Tiles(header) = client.next() {
+            all += usize::from(header.tiles.len() == 48);
+            few += usize::from(header.tiles.len() < 48);
+        }
+    }
+    assert!(few > 10, "{few} messages of some tiles, {all} of all");
+    assert!(few > 3 * all, "{few} messages of some tiles, {all} of all");
+}
+
+#[test]
+fn an_input_comes_back_with_the_first_picture_that_shows_it() {
+    let running = start(options());
+    let mut client = Client::connect(&running);
+    client.say(r#"{"type": "play", "on": false}"#);
+    client.exact();
+    client.say(r#"{"type": "camera", "input": 41, "orbit": [0.2, 0.0]}"#);
+    let before = client.canvas.clone();
+    client.until("the input", |client, received| match received {
+        Received::Tiles(header) if header.input == 41 => {
+            assert_ne!(client.canvas, before, "the picture has moved");
+            Some(())
+        }
+        Received::Tiles(header) => {
+            assert_eq!(header.input, 0);
+            None
+        }
+        _ => None,
+    });
+}
+
+#[test]
+fn another_size_is_another_generation() {
+    let running = start(options());
+    let mut client = Client::connect(&running);
+    client.exact_size((160, 120));
+    client.say(r#"{"type": "settings", "picture": "window"}"#);
+    client.say(r#"{"type": "size", "place": [77, 45]}"#);
+    client.exact_size((77, 45));
+    client.say(r#"{"type": "settings", "picture": "64x300"}"#);
+    client.exact_size((64, 300));
+}
+
+impl Client {
+    fn exact_size(&mut self, size: (u32, u32)) {
+        self.until("the size", |client, received| {
+            let tiles = matches!(received, Received::Tiles(_));
+            (tiles && client.canvas.dimensions() == size).then_some(())
+        });
+    }
+}
+
+#[test]
+fn every_setting_can_be_set_and_is_told() {
+    let running = start(options());
+    let mut client = Client::connect(&running);
+    for (say, key, want) in [
+        (r#"{"type": "settings", "sampler": "change", "w_d": 0.5}"#, "w_d", "0.5"),
+        (r#"{"type": "settings", "reconstruction": "hold"}"#, "reconstruction", "\"hold\""),
+        (r#"{"type": "settings", "samples_per_sec": 5000}"#, "samples_per_sec", "5000.0"),
+        (r#"{"type": "settings", "samples_per_sec": null}"#, "samples_per_sec", "null"),
+        (r#"{"type": "settings", "exposure_stops": -1}"#, "exposure_stops", "-1.0"),
+    ] {
+        client.say(say);
+        client.state(say, |state| state["settings"][key].to_string() == want);
+    }
+    client.say(r#"{"type": "settings", "overlay": "source-age"}"#);
+    let legend = client.until("a legend", |_, received| match received {
+        Received::Json(json) if json["type"] == "legend" && !json["title"].is_null() => {
+            Some(json.clone())
+        }
+        _ => None,
+    });
+    assert!(legend["ticks"].as_array().is_some_and(|ticks| ticks.len() > 2), "{legend}");
+    client.say(r#"{"type": "settings", "sampler": "best"}"#);
+    assert!(client.json("notice")["text"].to_string().contains("best"));
+}
+
+#[test]
+fn scenes_are_opened_by_name_and_by_upload_and_nothing_else() {
+    let running = start(options());
+    let mut client = Client::connect(&running);
+    client.json("scene");
+    client.say(r#"{"type": "open", "name": "orbit"}"#);
+    assert_eq!(client.json("scene")["name"], "orbit");
+    client.say(r#"{"type": "open", "name": "/etc/passwd"}"#);
+    assert!(client.json("notice")["text"].to_string().contains("no built-in scene"));
+
+    let upload = |query: &str, origin: &str, body: &[u8]| {
+        let (pass, length) = (running.pass(), body.len());
+        let head = format!(
+            "POST /upload?{query} HTTP/1.1\r\n{pass}Origin: {origin}\r\nContent-Length: {length}\r\n\r\n"
+        );
+        running.ask(&[head.as_bytes(), body].concat())
+    };
+    let own = running.origin();
+    let query = format!("client={}&name=my%20scene.glb", client.number);
+    let bad = upload(&query, &own, b"not a scene");
+    let text = String::from_utf8_lossy(&bad.body).into_owned();
+    assert_eq!(bad.status, 422, "{text}");
+    assert!(text.contains("my scene.glb"), "{text}");
+    let outside = br#"{"asset": {"version": "2.0"}, "buffers": [{"byteLength": 4, "uri": "../../secret.bin"}]}"#;
+    let relative = upload(&query, &own, outside);
+    assert_eq!(relative.status, 422, "{}", String::from_utf8_lossy(&relative.body));
+    let good = br#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{}]}"#;
+    let good = upload(&query, &own, good);
+    assert_eq!(good.status, 200, "{}", String::from_utf8_lossy(&good.body));
+    assert_eq!(client.json("scene")["name"], "my scene.glb");
+    assert_eq!(upload("client=999&name=x", &own, b"{}").status, 403);
+    assert_eq!(upload(&query, "http://localhost:1", b"{}").status, 403);
+}
+
+#[test]
+fn uploads_have_a_limit() {
+    let running = start(frameless_web::Options { upload_bytes: 1000, ..options() });
+    let client = Client::connect(&running);
+    let (pass, origin, number) = (running.pass(), running.origin(), client.number);
+    let head = format!("POST /upload?client={number} HTTP/1.1\r\n{pass}Origin: {origin}\r\n");
+    let announced = running.ask(format!("{head}Content-Length: 1001\r\n\r\n").as_bytes());
+    assert_eq!(announced.status, 413);
+    // Without a length: in pieces.
+    let pieces = format!(
+        "{head}Transfer-Encoding: chunked\r\n\r\n{}0\r\n\r\n",
+        format!("190\r\n{}\r\n", "x".repeat(400)).repeat(3)
+    );
+    assert_eq!(running.ask(pieces.as_bytes()).status, 413);
+}
+
+#[test]
+fn a_recording_comes_while_it_is_made() {
+    let running = start(options());
+    let mut client = Client::connect(&running);
+    client.until("tiles", |_, received| matches!(received, Received::Tiles(_)).then_some(()));
+    let (address, pass) = (running.address, running.pass());
+    let mut film = std::net::TcpStream::connect(address).unwrap();
+    film.write_all(format!("GET /recording.mp4 HTTP/1.1\r\n{pass}\r\n").as_bytes()).unwrap();
+    let mut bytes = Vec::new();
+    let begin = Instant::now();
+    // The head and two fragments at least.
+    while bytes.windows(4).filter(|name| name == b"moof").count() < 2 {
+        assert!(begin.elapsed() < PATIENCE, "{} bytes came", bytes.len());
+        let mut piece = [0; 4096];
+        let count = film.read(&mut piece).unwrap();
+        bytes.extend_from_slice(&piece[..count]);
+        client.receive(Duration::from_millis(1));
+    }
+    let head = String::from_utf8_lossy(&bytes[..300]).to_ascii_lowercase();
+    assert!(head.starts_with("http/1.1 200") && head.contains("video/mp4"), "{head}");
+    assert!(bytes.windows(4).any(|name| name == b"ftyp"));
+}
