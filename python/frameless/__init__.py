@@ -24,14 +24,16 @@ from ._frameless import (
     CanvasView,
     Observed,
     Scene,
+    Served,
     Session,
     __version__,
 )
-from . import metrics
+from . import metrics, testing
 from .experiment import compare, compare_file
 from .png import save_png
 from .samples import Samples
 from .sampling import CanvasLike, Sampler
+from .serving import serve, view
 
 __all__ = [
     "Batch",
@@ -45,10 +47,14 @@ __all__ = [
     "Sampler",
     "Samples",
     "Scene",
+    "Served",
     "Session",
     "__version__",
     "compare",
     "compare_file",
     "metrics",
     "save_png",
+    "serve",
+    "testing",
+    "view",
 ]

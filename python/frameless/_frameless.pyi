@@ -22,13 +22,16 @@ __all__ = [
     "CanvasView",
     "Observed",
     "Scene",
+    "Served",
     "Session",
     "__version__",
     "flip",
+    "loop_without_python",
     "psnr",
     "rmse",
     "run_experiment",
     "ssim",
+    "start_serving",
 ]
 __version__: str
 
@@ -240,6 +243,38 @@ class Scene:
     ) -> _Floats32: ...
     def __call__(self, x: _Array, y: _Array, time: float, camera: Camera) -> Samples: ...
 
+@final
+class Served:
+    @property
+    def url(self) -> str: ...
+    @property
+    def size(self) -> tuple[int, int]: ...
+    @property
+    def running(self) -> bool: ...
+    @property
+    def failed(self) -> bool: ...
+    def check(self) -> None: ...
+    def set_render(self, render: Callable[..., Any]) -> None: ...
+    def wait(self, seconds: float | None = None) -> None: ...
+    def stop(self) -> None: ...
+    def _repr_html_(self) -> str: ...
+
+def start_serving(
+    render: Callable[..., Any],
+    size: tuple[int, int],
+    camera: Camera,
+    sampler: str,
+    reconstruction: str,
+    batch_ms: float,
+    budget: float | None,
+    exposure: float,
+    noisy: bool,
+    port: int,
+    allow_frame: str | None,
+) -> Served: ...
+def loop_without_python(
+    size: tuple[int, int], sampler: str, reconstruction: str, batch: int, seconds: float
+) -> tuple[int, float]: ...
 def run_experiment(
     text: str,
     folder: str,

@@ -61,6 +61,11 @@ impl Camera {
         self.distance
     }
 
+    /// What it looks at.
+    pub(crate) fn target_point(&self) -> Vec3 {
+        Vec3::from(self.view.world_from_camera.translation) + self.distance * self.ahead()
+    }
+
     fn ahead(&self) -> Vec3 {
         (-self.view.world_from_camera.matrix3.z_axis).into()
     }
@@ -103,7 +108,7 @@ impl Camera {
     /// What it looks at: (x, y, z) in world coordinates.
     #[getter]
     fn target(&self) -> (f32, f32, f32) {
-        (Vec3::from(self.view.world_from_camera.translation) + self.distance * self.ahead()).into()
+        self.target_point().into()
     }
 
     /// What is upwards, as given.

@@ -5,6 +5,7 @@
 
 mod array;
 mod batch;
+mod bench;
 mod camera;
 mod canvas;
 mod columns;
@@ -19,9 +20,11 @@ mod outside;
 mod planes;
 mod sampler;
 mod scene;
+mod serve;
 mod session;
 mod shared;
 mod size;
+mod stage;
 
 use pyo3::prelude::*;
 
@@ -38,6 +41,9 @@ fn _frameless(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<observed::Observed>()?;
     module.add_class::<sampler::BuiltinSampler>()?;
     module.add_class::<scene::Scene>()?;
+    module.add_class::<serve::Served>()?;
+    module.add_function(wrap_pyfunction!(serve::start_serving, module)?)?;
+    module.add_function(wrap_pyfunction!(bench::loop_without_python, module)?)?;
     module.add_function(wrap_pyfunction!(compare::run_experiment, module)?)?;
     module.add_function(wrap_pyfunction!(metrics::rmse, module)?)?;
     module.add_function(wrap_pyfunction!(metrics::psnr, module)?)?;

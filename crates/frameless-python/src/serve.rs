@@ -1,15 +1,13 @@
 //! A renderer in Python on a web page.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use frameless::{Clock, ReconstructionKind, SamplerKind};
-use frameless_scene::{Geometry, Instance, Material, Node, Scene, Transform};
 use frameless_session::{Helm, PictureSize as Shown, Session, Settings};
 use frameless_web::{Options, Server, Show, Stopper};
-use glam::{Quat, Vec3};
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
@@ -24,7 +22,7 @@ use crate::stage::{PythonStage, Render};
 ///
 /// What the renderer raises stops the picture; `wait`, `stop` and `check` raise it as it is, and after that, or with `set_render`, the
 /// picture goes on.
-#[pyclass(frozen, module = "frameless")]
+#[pyclass(frozen, weakref, module = "frameless")]
 pub(crate) struct Served {
     url: String,
     size: (u32, u32),
@@ -70,7 +68,7 @@ impl Served {
         };
         let clock = Clock::real_for_calls(what.batch_secs);
         let session = Session::new(what.size.0, clock, settings, 1, stage);
-        let helm = Helm::new(Arc::new(stand_in(&what.camera)));
+        let helm = Helm::without_scene(what.camera.view(), what.camera.target_point());
         let show = Show { session, helm, scenes: None };
         let (url, stopper) = (server.url(), server.stopper());
         let thread = std::thread::Builder::new()
@@ -96,30 +94,6 @@ impl Served {
             Ok(Err(error)) => Err(PyRuntimeError::new_err(format!("{error:#}"))),
             Err(_) => Err(PyRuntimeError::new_err("the server panicked; its message is above")),
         }
-    }
-}
-
-/// A scene that is never traced: it has the renderer's camera, and something at its target for the camera to turn around.
-fn stand_in(camera: &Camera) -> Scene {
-    let node = |transform: Transform| Node { name: String::new(), parent: None, rest: transform };
-    let (_, rotation, eye) = camera.view().world_from_camera.to_scale_rotation_translation();
-    let looking = Transform { translation: eye, rotation, scale: Vec3::ONE };
-    let ahead = camera.distance() * (rotation * Vec3::NEG_Z);
-    let scale = Vec3::splat(1e-3 * camera.distance());
-    let target = Transform { translation: eye + ahead, rotation: Quat::IDENTITY, scale };
-    Scene {
-        name: "render".to_owned(),
-        geometries: vec![Geometry::Sphere { material: 0 }],
-        materials: vec![Material::default()],
-        nodes: vec![node(looking), node(target)],
-        instances: vec![Instance { node: 1, geometry: 0 }],
-        cameras: vec![frameless_scene::Camera {
-            name: String::new(),
-            node: 0,
-            projection: camera.view().projection,
-        }],
-        ambient: Vec3::ONE,
-        ..Scene::default()
     }
 }
 
@@ -157,7 +131,9 @@ impl Served {
     /// Let another function render from now on; the picture stays until it is traced anew. Forgets what the old one raised.
     fn set_render(&self, py: Python<'_>, render: Py<PyAny>) -> PyResult<()> {
         if !render.bind(py).is_callable() {
-            return Err(PyValueError::new_err("render: wanted a function render(x, y, time, camera)"));
+            return Err(PyValueError::new_err(
+                "render: wanted a function render(x, y, time, camera)",
+            ));
         }
         self.render.set(py, render);
         self.raised.take().ok();
@@ -195,7 +171,9 @@ impl Served {
         // Room for the page's own controls below the picture.
         let height = height.max(240) + 120;
         let width = width.max(480);
-        format!("<iframe src=\"{url}\" width=\"{width}\" height=\"{height}\" style=\"border:0\"></iframe>")
+        format!(
+            "<iframe src=\"{url}\" width=\"{width}\" height=\"{height}\" style=\"border:0\"></iframe>"
+        )
     }
 
     fn __repr__(&self) -> String {
@@ -228,10 +206,14 @@ pub(crate) fn start_serving(
     }
     let positive = |name: &str, value: f64| match value > 0.0 && value.is_finite() {
         true => Ok(value),
-        false => Err(PyValueError::new_err(format!("{name}: wanted a number above 0, got {value}"))),
+        false => {
+            Err(PyValueError::new_err(format!("{name}: wanted a number above 0, got {value}")))
+        }
     };
     if !exposure.is_finite() {
-        return Err(PyValueError::new_err(format!("exposure: wanted finite stops, got {exposure}")));
+        return Err(PyValueError::new_err(format!(
+            "exposure: wanted finite stops, got {exposure}"
+        )));
     }
     let (sampler, reconstruction) = named(sampler, reconstruction)?;
     let batch_secs = 1e-3 * positive("batch_ms", batch_ms)?;

@@ -53,7 +53,12 @@ pub(crate) struct PythonStage {
 const REST: Duration = Duration::from_millis(20);
 
 impl PythonStage {
-    pub(crate) fn new(render: Render, camera: Camera, is_noisy: bool, raised: Raised) -> PythonStage {
+    pub(crate) fn new(
+        render: Render,
+        camera: Camera,
+        is_noisy: bool,
+        raised: Raised,
+    ) -> PythonStage {
         let outside = Outside::new(Some(camera), is_noisy);
         PythonStage { render, raised, outside, own_camera: camera, answers: VecDeque::new() }
     }
