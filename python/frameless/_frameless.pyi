@@ -270,7 +270,7 @@ def start_serving(
     exposure: float,
     noisy: bool,
     port: int,
-    allow_frame: str | None,
+    allow_frame: str,
 ) -> Served: ...
 def loop_without_python(
     size: tuple[int, int], sampler: str, reconstruction: str, batch: int, seconds: float

@@ -29,7 +29,7 @@ def serve(
     exposure: float = 0.0,
     noisy: bool = False,
     port: int = 0,
-    allow_frame: str | None = None,
+    allow_frame: str = "http://localhost:*",
 ) -> Served:
     """Show a renderer on a web page of this machine, and return at once. The last line of a notebook's cell shows it inline.
 
@@ -44,7 +44,8 @@ def serve(
     exposure : stops by which radiance is multiplied before it is shown
     noisy : whether colours have noise; render is then called with seeds
     port : where the page listens, on this machine only; default: any free port
-    allow_frame : origin of pages that may show this one inside them, as notebooks do: default: any page of this machine
+    allow_frame : origin of the pages that may show this one inside them, as notebooks do. Default: those that are reached under the
+        name localhost, at any port. A notebook opened as 127.0.0.1 or elsewhere shows no page inline; open `url` then
 
     Raises OSError if the port is taken, ValueError for values that make no sense.
     """

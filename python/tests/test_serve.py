@@ -13,10 +13,16 @@ from frameless import Samples, serve
 from conftest import pattern
 
 
-def get(url: str) -> tuple[int, str]:
+def get(url: str, then: str | None = None) -> tuple[int, str]:
+    """What a browser gets at a URL, and at another one after it with the cookies of the first."""
+    browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
     try:
-        with urllib.request.build_opener(urllib.request.HTTPCookieProcessor()).open(url, timeout=10) as answer:
-            return answer.status, answer.read().decode()
+        with browser.open(url, timeout=10) as answer:
+            found = answer.status, answer.read().decode()
+        if then is not None:
+            with browser.open(then, timeout=10) as answer:
+                found = answer.status, answer.read().decode()
+        return found
     except urllib.error.HTTPError as error:
         return error.code, error.read().decode()
 
@@ -38,12 +44,16 @@ def test_a_page_is_served_to_who_knows_the_secret() -> None:
     served = serve(render, (64, 48))
     try:
         assert served.running and served.size == (64, 48) and "127.0.0.1" in served.url
-        status, page = get(served.url)
+        plain = served.url.partition("?")[0]
+        status, page = get(served.url, then=plain)
         assert status == 200 and "<canvas" in page
-        assert get(served.url.partition("?")[0])[0] in (401, 403), "without the secret"
+        assert get(plain)[0] in (401, 403), "without the secret"
         wait_for(lambda: sum(n for n, _ in calls) > 64 * 48)
         assert {size for _, size in calls} == {(64, 48)}
-        assert served.url in served._repr_html_() and "iframe" in served._repr_html_()
+        # Notebooks are reached as localhost: as another host the page's cookie would be a stranger's.
+        assert served.url.replace("127.0.0.1", "localhost") in served._repr_html_()
+        with urllib.request.urlopen(served.url) as answer:
+            assert "frame-ancestors http://localhost:*" in answer.headers["Content-Security-Policy"]
     finally:
         served.stop()
     assert not served.running and "stopped" in repr(served)

@@ -167,12 +167,12 @@ impl Served {
 
     /// The page inline in a notebook.
     fn _repr_html_(&self) -> String {
-        let ((width, height), url) = (self.size, &self.url);
-        // Room for the page's own controls below the picture.
-        let height = height.max(240) + 120;
-        let width = width.max(480);
+        // Room for the page's own controls beside or below the picture.
+        let height = self.size.1.max(360) + 180;
+        // As Jupyter's own address: in a page of another host, this one's cookie would be a stranger's.
+        let url = self.url.replace("127.0.0.1", "localhost");
         format!(
-            "<iframe src=\"{url}\" width=\"{width}\" height=\"{height}\" style=\"border:0\"></iframe>"
+            "<iframe src=\"{url}\" width=\"100%\" height=\"{height}\" style=\"border:0\"></iframe>"
         )
     }
 
@@ -199,7 +199,7 @@ pub(crate) fn start_serving(
     exposure: f32,
     noisy: bool,
     port: u16,
-    allow_frame: Option<String>,
+    allow_frame: String,
 ) -> PyResult<Served> {
     if !render.is_callable() {
         return Err(PyValueError::new_err("render: wanted a function render(x, y, time, camera)"));
@@ -219,5 +219,5 @@ pub(crate) fn start_serving(
     let batch_secs = 1e-3 * positive("batch_ms", batch_ms)?;
     let budget = budget.map(|budget| positive("budget", budget)).transpose()?;
     let what = What { size, camera, sampler, reconstruction, batch_secs, budget, exposure, noisy };
-    Served::start(render, &what, Where { port, allow_frame })
+    Served::start(render, &what, Where { port, allow_frame: Some(allow_frame) })
 }
