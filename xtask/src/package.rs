@@ -60,12 +60,14 @@ fn build(out: &Path) -> Result<Done> {
         )));
     }
     let mut maturin = python();
-    maturin.args(["-m", "maturin", "build", "--quiet", "--profile", "dev"]);
-    maturin.args(["--manifest-path", "crates/frameless-python/Cargo.toml", "--out"]).arg(out);
+    maturin.current_dir(in_project("python"));
+    maturin.args(["-m", "maturin", "build", "--quiet", "--profile", "dev", "--out"]).arg(out);
     said(&mut maturin, BUILDS_WITHIN)?;
     let wheels: Vec<PathBuf> =
         out.read_dir()?.map(|entry| Ok(entry?.path())).collect::<Result<_>>()?;
     let [wheel] = wheels.as_slice() else { bail!("wanted one wheel, got {wheels:?}") };
+    let name = wheel.file_name().unwrap_or_default().to_string_lossy();
+    ensure!(name.starts_with("frameless-"), "wanted a wheel named frameless-…, got {name}");
     let mut pip = python();
     pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
     pip.args(["--force-reinstall", "--no-deps"]).arg(wheel);

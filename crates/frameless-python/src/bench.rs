@@ -1,7 +1,5 @@
 //! The loop without Python, to be compared with.
 
-use std::time::Duration;
-
 use frameless::{Answer, Clock, Engine, Time};
 use pyo3::prelude::*;
 
@@ -25,8 +23,7 @@ pub(crate) fn loop_without_python(
     let mut engine = Engine::new(size.0, Clock::real(), sampler.build(1), outside);
     engine.set_reconstruction(reconstruction.build());
     let mut state = State::new(engine, Length::Fixed(batch));
-    let end =
-        Time::from_secs(Duration::try_from_secs_f64(seconds).unwrap_or_default().as_secs_f64());
+    let end = Time::from_secs(seconds);
     py.detach(move || {
         while state.engine.now() < end {
             state.refresh_if_due();

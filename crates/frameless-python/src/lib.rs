@@ -5,6 +5,7 @@
 
 mod array;
 mod batch;
+mod batches;
 mod bench;
 mod camera;
 mod canvas;
@@ -34,7 +35,7 @@ fn _frameless(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<camera::Camera>()?;
     module.add_class::<session::Session>()?;
-    module.add_class::<session::Batches>()?;
+    module.add_class::<batches::Batches>()?;
     module.add_class::<batch::Batch>()?;
     module.add_class::<canvas::PyCanvas>()?;
     module.add_class::<mirror::CanvasView>()?;

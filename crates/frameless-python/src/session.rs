@@ -12,6 +12,7 @@ use pyo3::types::PyDict;
 
 use crate::array;
 use crate::batch::Batch;
+use crate::batches::Batches;
 use crate::camera::Camera;
 use crate::invoke;
 use crate::outside::{Outside, Placed};
@@ -82,7 +83,7 @@ fn length(batch: Option<usize>, batch_ms: f64) -> PyResult<Length> {
 
 impl Session {
     /// The next batch that has samples, or `None` at the end. Looks for Ctrl-C while it waits.
-    fn next_batch(&self, py: Python<'_>, end: Option<Time>) -> PyResult<Option<Batch>> {
+    pub(crate) fn next_batch(&self, py: Python<'_>, end: Option<Time>) -> PyResult<Option<Batch>> {
         loop {
             let chosen = self.shared.with(py, |state| {
                 let is_over = end.is_some_and(|end| state.engine.now() >= end);
@@ -349,7 +350,7 @@ impl Session {
     #[pyo3(signature = (seconds=None))]
     fn batches(slf: Bound<'_, Session>, seconds: Option<f64>) -> PyResult<Batches> {
         let end = slf.get().end(slf.py(), seconds)?;
-        Ok(Batches { session: slf.unbind(), end })
+        Ok(Batches::new(slf.unbind(), end))
     }
 
     /// Let `render(x, y, time, camera)` answer batches for so many seconds of the session's clock, or until it is closed.
@@ -391,7 +392,7 @@ impl Session {
     }
 
     fn __iter__(slf: Bound<'_, Session>) -> Batches {
-        Batches { session: slf.unbind(), end: None }
+        Batches::new(slf.unbind(), None)
     }
 
     fn __enter__(slf: Bound<'_, Session>) -> Bound<'_, Session> {
@@ -405,23 +406,5 @@ impl Session {
         _exception: &Bound<'_, pyo3::types::PyTuple>,
     ) -> PyResult<()> {
         self.close(py)
-    }
-}
-
-/// The batches of a session, one after the other.
-#[pyclass(frozen, module = "frameless")]
-pub(crate) struct Batches {
-    session: Py<Session>,
-    end: Option<Time>,
-}
-
-#[pymethods]
-impl Batches {
-    fn __iter__(slf: Bound<'_, Batches>) -> Bound<'_, Batches> {
-        slf
-    }
-
-    fn __next__(&self, py: Python<'_>) -> PyResult<Option<Batch>> {
-        self.session.get().next_batch(py, self.end)
     }
 }
