@@ -3,6 +3,7 @@
 mod browser;
 mod command;
 mod missing;
+mod package;
 mod picture;
 mod program;
 mod python;
@@ -18,11 +19,13 @@ const HELP: &str = "\
 Project chores. Run them from anywhere in the checkout:
 
   cargo xtask test           everything that CI checks: formatting, clippy, all tests, the program as a
-                             user runs it, a small comparison with its video and report, the web page, the window
+                             user runs it, a small comparison with its video and report, the web page, the window, the
+                             Python package with its examples
   cargo xtask smoke-window   only the window: opens it on a virtual screen and looks at a screenshot
   cargo xtask smoke-report   only a small comparison: nothing got worse, and its report opens in a browser
   cargo xtask smoke-web      only the web page: what it must do, in a headless browser
   cargo xtask measure-web    the web page's latency, traffic and cost, in a headless browser; minutes, and a quiet machine
+  cargo xtask python         only the Python package: wheel, tests, types, reference, examples, notebook
   cargo xtask help           this text
 
 What is missing on this machine is named together with the way to install it, and the checks that need it
@@ -38,6 +41,7 @@ fn main() -> ExitCode {
         ["smoke-report"] => test::only_report(),
         ["smoke-web"] => test::only_web_page(),
         ["measure-web"] => test::measure_web_page(),
+        ["python"] => test::only_python(),
         [] | ["help" | "--help" | "-h"] => {
             println!("{HELP}");
             true

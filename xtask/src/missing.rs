@@ -1,6 +1,6 @@
 //! What the checks need from the machine, and how one gets it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// Libraries that the window loads while it runs (none is needed to build), with their Debian packages.
@@ -89,6 +89,34 @@ pub(crate) fn to_open_a_report() -> Vec<Missing> {
     vec![debian("Chromium", "the report is opened in a browser", "chromium")]
 }
 
+/// Needed to run the examples with Mitsuba.
+pub(crate) fn to_run_mitsuba() -> Missing {
+    debian("LLVM 16 or newer", "Mitsuba compiles its kernels with it", "libllvm19")
+}
+
+/// The newest LLVM that Mitsuba can use: what the environment says, or what the dynamic linker knows.
+pub(crate) fn llvm() -> Option<PathBuf> {
+    if let Some(named) = std::env::var_os("DRJIT_LIBLLVM_PATH") {
+        return Some(named.into());
+    }
+    newest_llvm(&known_libraries()?)
+}
+
+/// From lines like `libLLVM-16.so.1 (libc6,x86-64) => /lib/x86_64-linux-gnu/libLLVM-16.so.1`. Older ones lack what Mitsuba asks for.
+fn newest_llvm(libraries: &str) -> Option<PathBuf> {
+    const OLDEST: u32 = 16;
+    let version = |line: &str| {
+        let name = line.split_whitespace().next()?.strip_prefix("libLLVM")?;
+        let digits = name.strip_prefix("-").or(name.strip_prefix(".so."))?;
+        digits.split(|c: char| !c.is_ascii_digit()).next()?.parse::<u32>().ok()
+    };
+    let found = libraries.lines().filter_map(|line| {
+        let path = line.split_once("=> ")?.1;
+        Some((version(line)?, path))
+    });
+    found.filter(|(version, _)| *version >= OLDEST).max().map(|(_, path)| path.into())
+}
+
 /// The browser's name, if there is one.
 pub(crate) fn browser() -> Option<&'static str> {
     let names = ["chromium", "chromium-browser", "google-chrome"];
@@ -120,4 +148,20 @@ fn known_libraries() -> Option<String> {
         .iter()
         .find_map(|program| Command::new(program).arg("-p").output().ok())?;
     Some(String::from_utf8_lossy(&list.stdout).into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_newest_llvm_that_will_do_is_found() {
+        let libraries = "\tlibLLVM-15.so.1 (libc6,x86-64) => /lib/libLLVM-15.so.1\n\
+            \tlibLLVM.so.19.1 (libc6,x86-64) => /lib/libLLVM.so.19.1\n\
+            \tlibLLVM-16.so.1 (libc6,x86-64) => /lib/libLLVM-16.so.1\n\
+            \tlibLLVMSPIRVLib.so.20 (libc6,x86-64) => /lib/other\n";
+        assert_eq!(newest_llvm(libraries), Some("/lib/libLLVM.so.19.1".into()));
+        assert_eq!(newest_llvm(libraries.lines().next().unwrap_or_default()), None);
+        assert_eq!(newest_llvm(""), None);
+    }
 }

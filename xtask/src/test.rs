@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 use crate::browser;
 use crate::command::{cargo, run, watch};
 use crate::missing::{self, Missing};
+use crate::package;
 use crate::program;
 use crate::steps::{Done, Steps};
 use crate::web;
@@ -26,6 +27,14 @@ pub(crate) fn everything() -> bool {
     steps.step("the report in a browser", open_report);
     steps.step("the web page", || web::page(&program()?, &out_dir("web")?));
     steps.step("the window", || open_window(&program()?));
+    package::steps(&mut steps, out_dir);
+    steps.finish()
+}
+
+/// Only the Python package. True if nothing failed.
+pub(crate) fn only_python() -> bool {
+    let mut steps = Steps::new(in_ci());
+    package::steps(&mut steps, out_dir);
     steps.finish()
 }
 

@@ -36,7 +36,7 @@ pub use subject::{Subject, SubjectTracer};
 
 pub use contender::{Arena, Contender, Shown};
 pub use ideal::{IdealAtRest, IdealEvent, Ideals, refresh_time};
-pub use run::{Cell, run};
+pub use run::{Cell, run, run_sampler};
 
 pub use metrics::{Picture, changed_region, flip, mean, psnr_db, quantile, rmse, rmse_where, ssim};
 pub use results::{

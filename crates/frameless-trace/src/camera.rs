@@ -26,7 +26,7 @@ impl ViewSource {
 
 /// A view prepared for a picture of one size.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Camera {
+pub struct Camera {
     size: Size,
     position: Vec3A,
     axes: Mat3A,
@@ -36,7 +36,8 @@ pub(crate) struct Camera {
 }
 
 impl Camera {
-    pub(crate) fn new(view: &View, size: Size) -> Camera {
+    /// `view` for a picture of `size`.
+    pub fn new(view: &View, size: Size) -> Camera {
         let (half_height, is_perspective) = match view.projection {
             Projection::Perspective { yfov_rad } => ((0.5 * yfov_rad).tan(), true),
             Projection::Orthographic { ymag } => (ymag, false),
@@ -50,8 +51,13 @@ impl Camera {
     /// With (x, y) in [−1, 1]² over the picture, y up: from the camera's position through (x·half, y·half, −1), or
     /// from (x·half, y·half, 0) along −z. The direction has unit length.
     #[inline]
-    pub(crate) fn ray(&self, request: &Request) -> Ray {
-        let [px, py] = request.position_px(self.size);
+    pub fn ray(&self, request: &Request) -> Ray {
+        self.ray_at(request.position_px(self.size))
+    }
+
+    /// The ray through a place in the picture, in pixels from its top-left corner.
+    #[inline]
+    pub fn ray_at(&self, [px, py]: [f32; 2]) -> Ray {
         let x = (2.0 * px / self.size.width as f32 - 1.0) * self.half[0];
         let y = (1.0 - 2.0 * py / self.size.height as f32) * self.half[1];
         if self.is_perspective {
@@ -67,14 +73,14 @@ impl Camera {
 impl Camera {
     /// Where points given in some coordinates are in the picture: the inverse of [`Camera::ray`]. Multiplied out in
     /// double precision, so that distant scenes keep their sub-pixel positions.
-    pub(crate) fn picture_from(&self, world_from_object: &Affine3A) -> PictureFrom {
+    pub fn picture_from(&self, world_from_object: &Affine3A) -> PictureFrom {
         let world_from_camera = Affine3A { matrix3: self.axes, translation: self.position };
         let camera_from_object = wide(&world_from_camera).inverse() * wide(world_from_object);
         rows(self.picture_from_camera() * DMat4::from(camera_from_object))
     }
 
     /// Where directions are in the picture; `None` if all rays are parallel.
-    pub(crate) fn picture_from_direction(&self) -> Option<PictureFrom> {
+    pub fn picture_from_direction(&self) -> Option<PictureFrom> {
         self.picture_from_directions(Mat3A::IDENTITY)
     }
 

@@ -44,10 +44,11 @@ mod shading;
 #[cfg(test)]
 mod test_scenes;
 
-pub use camera::ViewSource;
+pub use camera::{Camera, ViewSource};
 pub use cpu::{CpuTracer, thread_pool};
 pub use explain::explain;
 pub use integrator::{Integrator, Settings};
 pub use moment::Moment;
+pub use ray::Ray;
 pub use render::{Still, render, render_still};
 pub use world::World;

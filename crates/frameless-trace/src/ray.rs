@@ -6,9 +6,11 @@ use glam::{Affine3A, Vec3A};
 ///
 /// The direction need not have unit length: a ray taken into an instance's space keeps its t.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Ray {
-    pub(crate) origin: Vec3A,
-    pub(crate) direction: Vec3A,
+pub struct Ray {
+    /// Where it begins.
+    pub origin: Vec3A,
+    /// Where it goes.
+    pub direction: Vec3A,
 }
 
 impl Ray {

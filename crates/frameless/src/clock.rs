@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use crate::Time;
+use crate::{BatchLength, Time};
 
 /// Batches per second: a batch is at most about 1 ms of work. Feedback comes once per batch, and longer batches
 /// cost quality (4 ms: 8–15 % more error, 16 ms: up to 80 %); shorter ones cost overhead. A multiple of 60
@@ -36,6 +36,18 @@ impl Clock {
         Clock::Real(Real::start())
     }
 
+    /// The machine's clock for a renderer whose calls have a price: one batch at a time, as long as [`BatchLength`] finds best.
+    ///
+    /// # Panics
+    /// If `batch_secs`, what a batch should last, is not positive and finite.
+    pub fn real_for_calls(batch_secs: f64) -> Clock {
+        assert!(
+            batch_secs > 0.0 && batch_secs.is_finite(),
+            "a batch must last a positive and finite time, got {batch_secs} s"
+        );
+        Clock::Real(Real { length: Some(BatchLength::new(batch_secs)), ..Real::start() })
+    }
+
     /// The present time. The simulated clock stands still between batches.
     pub fn now(&self) -> Time {
         match self {
@@ -48,6 +60,14 @@ impl Clock {
     pub(crate) fn answered(&mut self, samples: usize, busy: bool) {
         if let Clock::Real(clock) = self {
             clock.answered(samples, busy);
+        }
+    }
+
+    /// Real clock: learn that a batch chosen at `begin` has been answered.
+    pub(crate) fn called(&mut self, samples: usize, begin: Time) {
+        let end = self.now();
+        if let Clock::Real(Real { length: Some(length), .. }) = self {
+            length.answered(samples, begin, end);
         }
     }
 
@@ -92,6 +112,8 @@ pub struct Real {
     allowance_at: Time,
     samples_per_sec: f64,
     last_answer: Option<Time>,
+    /// For a renderer whose calls have a price.
+    length: Option<BatchLength>,
 }
 
 // Until the first answer: a renderer that needs a second per sample must not be asked for a thousand.
@@ -110,6 +132,7 @@ impl Real {
             allowance_at: Time::ZERO,
             samples_per_sec: FIRST_BATCH as f64 * f64::from(BATCHES_PER_SEC),
             last_answer: None,
+            length: None,
         }
     }
 
@@ -124,10 +147,15 @@ impl Real {
         self.allowance_at = self.now();
     }
 
-    /// Time and number of samples of the next batch. Within a budget the number is 0 while nothing is due.
-    pub(crate) fn next_batch(&mut self) -> (Time, usize) {
+    /// For a renderer whose calls have a price: how many samples the next call should have.
+    pub(crate) fn next_call(&mut self) -> Option<usize> {
+        self.length.as_mut().map(BatchLength::next_length)
+    }
+
+    /// Time and number of samples of the next batch, of which `wanted` are asked for. Within a budget the number is smaller, and 0
+    /// while nothing is due.
+    pub(crate) fn next_batch(&mut self, wanted: usize) -> (Time, usize) {
         let now = self.now();
-        let wanted = self.batch_length();
         let Some(budget) = self.budget_per_sec else { return (now, wanted) };
         // What was not used in time is lost: a renderer that stood still does not catch up in a burst.
         let earned = budget * now.secs_since(self.allowance_at);
@@ -180,7 +208,8 @@ mod tests {
         let mut total = 0;
         let until = clock.now().0 + 100_000_000;
         while clock.now().0 < until {
-            total += clock.next_batch().1;
+            let wanted = clock.batch_length();
+            total += clock.next_batch(wanted).1;
             std::thread::sleep(Duration::from_micros(500));
         }
         assert!(total <= 10_200, "100 ms at 100,000 samples/s: {total}");

@@ -175,11 +175,16 @@ impl<T: Tracer> Engine<T> {
     }
 
     fn step_real(&mut self) -> Result<usize, EngineError> {
+        if let Clock::Real(clock) = &mut self.clock
+            && let Some(wanted) = clock.next_call()
+        {
+            return self.step_call(wanted);
+        }
         while let Clock::Real(clock) = &mut self.clock {
             if self.outstanding >= PIPELINE_DEPTH * clock.batch_length() {
                 break;
             }
-            let (now, count) = clock.next_batch();
+            let (now, count) = clock.next_batch(clock.batch_length());
             if count == 0 {
                 break;
             }
@@ -194,20 +199,59 @@ impl<T: Tracer> Engine<T> {
         Ok(kept)
     }
 
+    /// One batch, awaited, for a renderer whose calls have a price.
+    fn step_call(&mut self, wanted: usize) -> Result<usize, EngineError> {
+        let batch = self.choose(wanted);
+        let (now, samples) = (batch.now, batch.requests.len());
+        if samples == 0 {
+            self.clock.rest();
+            return Ok(0);
+        }
+        self.outstanding += samples;
+        self.tracer.submit(batch);
+        let kept = self.collect_all()?;
+        self.clock.called(samples, now);
+        Ok(kept)
+    }
+
     fn choose_and_submit(&mut self, now: Time, count: usize) {
+        let batch = self.batch(now, count);
+        self.outstanding += batch.requests.len();
+        self.tracer.submit(batch);
+    }
+
+    fn batch(&mut self, now: Time, count: usize) -> Batch {
         let mut requests = std::mem::take(&mut self.spare_requests);
         requests.clear();
         self.sampler.choose(now, &self.canvas, count, &mut requests);
         self.reconstruction.aim(now, &self.canvas, &mut requests);
-        self.outstanding += requests.len();
-        self.tracer.submit(Batch {
-            id: self.counters.batches,
-            now,
-            scene_secs: self.timeline.scene_secs(now),
-            size: self.canvas.size(),
-            requests,
-        });
+        let (id, scene_secs) = (self.counters.batches, self.timeline.scene_secs(now));
         self.counters.batches += 1;
+        Batch { id, now, scene_secs, size: self.canvas.size(), requests }
+    }
+
+    /// Chooses a batch for a renderer that the caller drives, instead of [`Engine::step`]: nothing is submitted to the engine's
+    /// own, and the answer is brought to [`Engine::answer`], whenever it comes, in parts, or never.
+    ///
+    /// Real clock: `wanted` samples; fewer, or none, within a budget. Simulated clock: as many as are due in the next slice of time,
+    /// which may be none.
+    pub fn choose(&mut self, wanted: usize) -> Batch {
+        let (now, count) = match &mut self.clock {
+            Clock::Simulated(clock) => clock.next_batch(),
+            Clock::Real(clock) => clock.next_batch(wanted),
+        };
+        self.batch(now, count)
+    }
+
+    /// Keeps and observes an answer to (part of) a batch of [`Engine::choose`]. Returns how many samples were kept.
+    ///
+    /// # Errors
+    /// As [`Engine::step`].
+    pub fn answer(&mut self, answer: Answer) -> Result<usize, EngineError> {
+        let outcome = self.keep(&answer);
+        let kept = self.observe(answer.now);
+        self.spare_requests = answer.requests;
+        outcome.map(|()| kept)
     }
 
     fn collect_all(&mut self) -> Result<usize, EngineError> {
@@ -228,10 +272,7 @@ impl<T: Tracer> Engine<T> {
             return Ok(None);
         };
         self.outstanding = self.outstanding.saturating_sub(answer.requests.len());
-        let outcome = self.keep(&answer);
-        let kept = self.observe(answer.now);
-        self.spare_requests = answer.requests;
-        outcome.map(|()| Some(kept))
+        self.answer(answer).map(Some)
     }
 
     /// Writes an answer to the canvas and notes what each sample replaced.
@@ -305,6 +346,14 @@ impl<T: Tracer> Engine<T> {
 
     /// The picture at `now`, display-referred sRGB in [0, 1], row-major.
     pub fn refresh(&mut self, now: Time) -> &[[f32; 3]] {
+        let mut picture = std::mem::take(&mut self.picture);
+        self.refresh_into(now, &mut picture);
+        self.picture = picture;
+        &self.picture
+    }
+
+    /// As [`Engine::refresh`], for who keeps the picture: whatever `picture` held before is overwritten.
+    pub fn refresh_into(&mut self, now: Time, picture: &mut Vec<[f32; 3]>) {
         let (secs, size) = (self.timeline.scene_secs(now), self.canvas.size());
         let pose = self.tracer.pose(secs, size, &mut self.pose).then_some(&self.pose);
         let lighting =
@@ -314,8 +363,7 @@ impl<T: Tracer> Engine<T> {
         let (display, is_noisy) = (&self.display, self.tracer.is_noisy());
         let wants_motion = self.sampler.wants_motion();
         let refresh = Refresh { now, pose, lighting, display, is_noisy, rates, wants_motion };
-        self.reconstruction.refresh(&refresh, &mut self.canvas, &mut self.picture);
-        &self.picture
+        self.reconstruction.refresh(&refresh, &mut self.canvas, picture);
     }
 
     /// Begin with a picture that is known already: its samples count as traced at their time, and nobody is told of changes.

@@ -26,6 +26,7 @@
 //! ```
 
 mod alias;
+mod batch_length;
 mod bayer;
 mod bilinear;
 mod canvas;
@@ -65,6 +66,7 @@ pub use tracer::{Function, Tracer};
 
 pub use canvas::Canvas;
 
+pub use batch_length::BatchLength;
 pub use clock::{BATCHES_PER_SEC, Clock, Real, Simulated};
 pub use engine::{Counters, Engine, EngineError};
 pub use timeline::Timeline;

@@ -284,3 +284,35 @@ fn observations_before_the_first_choice_are_harmless() {
     sampler.choose(Time(9), &Canvas::new(Size::new(8, 8)), 10, &mut requests);
     assert_eq!(requests.len(), 10);
 }
+
+#[test]
+fn a_renderer_whose_calls_have_a_price_gets_long_batches() {
+    // 2 ms per call and nothing per sample: batches of a millisecond would have one sample each.
+    let render = |batch: &Batch| {
+        std::thread::sleep(std::time::Duration::from_millis(2));
+        still(batch)
+    };
+    let clock = Clock::real_for_calls(1e-3);
+    let sampler = SamplerKind::Permutation.build(1);
+    let mut engine = Engine::new(Size::new(64, 48), clock, sampler, Function::new(render));
+    let steps: Vec<usize> = (0..40).map(|_| engine.step().expect("finite colours")).collect();
+    assert_eq!(steps.iter().sum::<usize>() as u64, engine.counters().kept);
+    assert!(steps[39] > 1000, "{steps:?}");
+}
+
+#[test]
+fn a_loop_driven_from_outside_makes_the_same_picture() {
+    let (size, rate) = (Size::new(40, 30), 30_000.0);
+    for kind in SamplerKind::ALL {
+        let mut inside = engine(size, rate, kind, half_flickering);
+        let mut outside = engine(size, rate, kind, half_flickering);
+        for _ in 0..200 {
+            inside.step().expect("finite colours");
+            let batch = outside.choose(usize::MAX);
+            let rgb = half_flickering(&batch);
+            outside.answer(Answer::to(batch, rgb, Vec::new())).expect("finite colours");
+        }
+        assert!(inside.canvas() == outside.canvas(), "{}", kind.name());
+        assert_eq!(inside.counters(), outside.counters());
+    }
+}

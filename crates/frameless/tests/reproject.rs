@@ -238,3 +238,18 @@ fn a_lamp_that_stays_changes_nothing() {
     let (picture, secs) = play(&mut engine, 40);
     assert_eq!(differences(&picture, &world.ideal(secs)), (0, 0.0));
 }
+
+#[test]
+fn after_two_refreshes_at_one_time_every_request_lies_in_its_pixel() {
+    let disc = |secs: f64| [20.0 + 60.0 * secs as f32, 36.0, 14.0];
+    let mut engine = engine(world(STILL, disc), ReconstructionKind::REPROJECT, 83_000.0);
+    play(&mut engine, 10);
+    let now = engine.now();
+    engine.refresh(now);
+    // The renderer is given another camera between the two.
+    engine.tracer_mut().world.camera = |_| [[1.0, 0.0, 3.3], [0.0, 1.0, -2.2]];
+    engine.refresh(now);
+    let asked = engine.choose(1000).requests;
+    let is_inside = |request: &frameless::Request| request.offset.iter().all(|o| o.abs() <= 0.5);
+    assert!(!asked.is_empty() && asked.iter().all(is_inside), "{asked:?}");
+}

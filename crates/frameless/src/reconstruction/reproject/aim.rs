@@ -17,9 +17,10 @@ impl Reproject {
         if motion == [0.0; 2] {
             return;
         }
-        // How much of the motion from refresh to refresh is still to come.
+        // How much of the motion from refresh to refresh is still to come; nothing after two refreshes at one time, between which
+        // the renderer was given another camera.
         let gone = now.secs_since(self.shown_at) as f32 / self.interval_secs;
-        let rest = (1.0 - gone).clamp(0.0, 1.0);
+        let rest = if self.interval_secs > 0.0 { (1.0 - gone).clamp(0.0, 1.0) } else { 0.0 };
         let (x, y) = size.xy(request.pixel);
         let position: [f32; 2] = std::array::from_fn(|k| {
             let here = [x, y][k] as f32 + 0.5;

@@ -1,0 +1,53 @@
+//! The Python package's compiled half, `frameless._frameless`: what the package shows of it is in `python/frameless`.
+//!
+//! Nothing here holds the interpreter while the engine works, and nothing is handed to Python that Rust still writes: arrays that
+//! go out own their memory, arrays that come in are copied once, while they are checked.
+
+mod array;
+mod batch;
+mod batches;
+mod bench;
+mod camera;
+mod canvas;
+mod columns;
+mod compare;
+mod hits;
+mod interrupt;
+mod invoke;
+mod metrics;
+mod mirror;
+mod observed;
+mod outside;
+mod planes;
+mod sampler;
+mod scene;
+mod serve;
+mod session;
+mod shared;
+mod size;
+mod stage;
+
+use pyo3::prelude::*;
+
+/// The compiled half of the package frameless.
+#[pymodule(gil_used = false)]
+fn _frameless(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<camera::Camera>()?;
+    module.add_class::<session::Session>()?;
+    module.add_class::<batches::Batches>()?;
+    module.add_class::<batch::Batch>()?;
+    module.add_class::<canvas::PyCanvas>()?;
+    module.add_class::<mirror::CanvasView>()?;
+    module.add_class::<observed::Observed>()?;
+    module.add_class::<sampler::BuiltinSampler>()?;
+    module.add_class::<scene::Scene>()?;
+    module.add_class::<serve::Served>()?;
+    module.add_function(wrap_pyfunction!(serve::start_serving, module)?)?;
+    module.add_function(wrap_pyfunction!(bench::loop_without_python, module)?)?;
+    module.add_function(wrap_pyfunction!(compare::run_experiment, module)?)?;
+    module.add_function(wrap_pyfunction!(metrics::rmse, module)?)?;
+    module.add_function(wrap_pyfunction!(metrics::psnr, module)?)?;
+    module.add_function(wrap_pyfunction!(metrics::ssim, module)?)?;
+    module.add_function(wrap_pyfunction!(metrics::flip, module)?)
+}

@@ -1,0 +1,271 @@
+//! The built-in scenes and tracer, and glTF files, as a renderer like any other.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use frameless::{Answer, Batch, Pose, Request, Size, Surface, Time, Tracer};
+use frameless_scene::{BUILTIN_NAMES, Limits, State, View, builtin, load};
+use frameless_trace::{CpuTracer, Ray, Settings, ViewSource, World, render, thread_pool};
+use glam::{Mat4, Vec3A};
+use numpy::PyArray3;
+use numpy::prelude::*;
+use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::prelude::*;
+
+use crate::array;
+use crate::camera::Camera;
+use crate::interrupt::interruptible;
+use crate::size::PictureSize;
+
+/// A scene that changes with time, and the renderer for it: direct light, hard shadows, mirrors, on all cores.
+///
+/// Made by `Scene.builtin(name)` or `Scene.load(path)`. Any thread may use it.
+#[pyclass(frozen, module = "frameless")]
+pub(crate) struct Scene {
+    world: Arc<World>,
+    /// Made when first used.
+    tracer: OnceLock<Mutex<CpuTracer>>,
+}
+
+impl Scene {
+    fn of(scene: frameless_scene::Scene) -> Scene {
+        Scene { world: Arc::new(World::new(Arc::new(scene))), tracer: OnceLock::new() }
+    }
+
+    fn scene(&self) -> &Arc<frameless_scene::Scene> {
+        self.world.scene()
+    }
+
+    fn checked_secs(time: f64) -> PyResult<f64> {
+        match time.is_finite() {
+            true => Ok(time),
+            false => Err(PyValueError::new_err(format!("time: wanted finite seconds, got {time}"))),
+        }
+    }
+
+    fn checked_camera(&self, camera: usize) -> PyResult<u32> {
+        let cameras = self.scene().cameras.len();
+        match camera < cameras {
+            true => Ok(camera as u32),
+            false => Err(PyValueError::new_err(format!(
+                "camera: wanted a number from 0 to {}, got {camera}",
+                cameras - 1
+            ))),
+        }
+    }
+
+    /// All samples at one time, in the order of their places.
+    fn answer(
+        &self,
+        places: Vec<[f32; 2]>,
+        secs: f64,
+        view: View,
+        size: Size,
+    ) -> Option<(Answer, Pose)> {
+        let tracer =
+            || CpuTracer::new(self.world.clone(), ViewSource::Free(view), Settings::default(), 0);
+        let mut tracer = self
+            .tracer
+            .get_or_init(|| Mutex::new(tracer()))
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        tracer.set_view(ViewSource::Free(view));
+        let requests = places.into_iter().map(|place| request(place, size)).collect();
+        tracer.submit(Batch { id: 0, now: Time::ZERO, scene_secs: secs, size, requests });
+        let answer = tracer.collect(true)?;
+        let mut pose = Pose::default();
+        tracer.pose(secs, size, &mut pose);
+        Some((answer, pose))
+    }
+}
+
+/// The request whose ray goes through a place; beside the picture the border pixel's, with a larger offset.
+fn request([x, y]: [f32; 2], size: Size) -> Request {
+    let column = (x.max(0.0) as u32).min(size.width - 1);
+    let row = (y.max(0.0) as u32).min(size.height - 1);
+    let offset = [x - column as f32 - 0.5, y - row as f32 - 0.5];
+    Request { pixel: size.index(column, row), offset, sample_index: 0 }
+}
+
+/// A hit in the world's coordinates: position and normal; of the sky, the direction. What is seen in a plane mirror is where its
+/// image is, behind the mirror.
+fn in_world(
+    surface: &Surface,
+    pose: &Pose,
+    ray: &Ray,
+    forward: Vec3A,
+    state: &State,
+    scene: &frameless_scene::Scene,
+) -> ([f32; 3], [f32; 3]) {
+    let depth = pose.project(surface).map_or(f32::INFINITY, |there| there.depth);
+    if !depth.is_finite() {
+        return (ray.direction.to_array(), [0.0; 3]);
+    }
+    let position = ray.origin + ray.direction * (depth / ray.direction.dot(forward));
+    let normal = scene.instances.get(surface.object as usize).map_or(Vec3A::ZERO, |instance| {
+        let linear = state.world_from_node[instance.node as usize].matrix3;
+        (linear.inverse().transpose() * Vec3A::from(surface.normal)).normalize_or_zero()
+    });
+    (position.to_array(), normal.to_array())
+}
+
+#[pymethods]
+impl Scene {
+    /// A scene that comes with the package; Scene.names() lists them.
+    #[staticmethod]
+    fn builtin(name: &str) -> PyResult<Scene> {
+        builtin(name).map(Scene::of).ok_or_else(|| {
+            let known = BUILTIN_NAMES.join(", ");
+            PyValueError::new_err(format!("name: wanted one of {known}; got {name:?}"))
+        })
+    }
+
+    /// A glTF 2.0 file (.gltf or .glb). Raises OSError if it cannot be read, ValueError if it is not what it should be.
+    #[staticmethod]
+    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Scene> {
+        if let Err(error) = std::fs::metadata(&path) {
+            return Err(PyOSError::new_err(format!("{}: {error}", path.display())));
+        }
+        let loaded = interruptible(py, move |_| load(&path, &Limits::default()).map(Scene::of))?;
+        loaded.map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    /// The scenes that come with the package.
+    #[staticmethod]
+    fn names() -> Vec<&'static str> {
+        BUILTIN_NAMES.to_vec()
+    }
+
+    /// File name, or the name of the built-in scene.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.scene().name
+    }
+
+    /// Seconds until the animation repeats or ends; 0 if nothing moves.
+    #[getter]
+    fn duration(&self) -> f64 {
+        self.scene().animation.duration_secs
+    }
+
+    /// How many cameras there are; at least 1.
+    #[getter]
+    fn cameras(&self) -> usize {
+        self.scene().cameras.len()
+    }
+
+    /// How many objects there are; their numbers are those in Samples.object_id.
+    #[getter]
+    fn objects(&self) -> usize {
+        self.scene().instances.len()
+    }
+
+    /// What was ignored or replaced while loading.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.scene().warnings.clone()
+    }
+
+    /// One of the scene's cameras as it is at a time (seconds).
+    #[pyo3(signature = (index=0, time=0.0))]
+    fn camera(&self, index: usize, time: f64) -> PyResult<Camera> {
+        let (index, secs) = (self.checked_camera(index)?, Scene::checked_secs(time)?);
+        let view = self.scene().view_at(&self.scene().state_at(secs), index);
+        Ok(Camera::from_view(view, 1.0))
+    }
+
+    /// Where every object is at a time (seconds): world from object, float32, shape (objects, 4, 4). For Session.place.
+    fn transforms<'py>(&self, py: Python<'py>, time: f64) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        let state = self.scene().state_at(Scene::checked_secs(time)?);
+        let rows = self.scene().instances.iter().flat_map(|instance| {
+            Mat4::from(state.world_from_node[instance.node as usize]).transpose().to_cols_array()
+        });
+        array::column(py, rows.collect()).reshape([self.scene().instances.len(), 4, 4])
+    }
+
+    /// The whole picture at one moment: linear RGB radiance of pixel centres, float32, shape (height, width, 3).
+    ///
+    /// Parameters
+    /// ----------
+    /// size : (width, height) in pixels
+    /// time : seconds of the scene
+    /// camera : a Camera, or the number of one of the scene's; default 0
+    #[pyo3(signature = (size, time=0.0, camera=None))]
+    fn render<'py>(
+        &self,
+        py: Python<'py>,
+        size: PictureSize,
+        time: f64,
+        camera: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        let secs = Scene::checked_secs(time)?;
+        let view = match camera {
+            None => ViewSource::Camera(0),
+            Some(camera) => match camera.extract::<Camera>() {
+                Ok(camera) => ViewSource::Free(*camera.view()),
+                Err(_) => ViewSource::Camera(self.checked_camera(camera.extract()?)?),
+            },
+        };
+        let (world, size) = (self.world.clone(), size.0);
+        let picture = interruptible(py, move |_| {
+            render(&world, secs, &view, size, &Settings::default(), &thread_pool(0))
+        })?;
+        array::colours(py, size, picture)
+    }
+
+    /// Traces places in the picture: a scene is a function `render(x, y, time, camera)` like any other.
+    ///
+    /// Parameters
+    /// ----------
+    /// x, y : float arrays of shape (n,), pixels from the picture's top-left corner
+    /// time : seconds of the scene
+    /// camera : one that knows the size of its picture, as batches' do; see Camera.with_size
+    ///
+    /// Returns Samples: linear RGB, with positions and normals in world coordinates and object numbers (-1: the sky).
+    fn __call__<'py>(
+        &self,
+        x: &Bound<'py, PyAny>,
+        y: &Bound<'py, PyAny>,
+        time: f64,
+        camera: Camera,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (py, secs) = (x.py(), Scene::checked_secs(time)?);
+        let (x, y) = (array::floats("x", x)?, array::floats("y", y)?);
+        if x.len() != y.len() {
+            let message = format!("y: wanted shape ({},) like x, got ({},)", x.len(), y.len());
+            return Err(PyValueError::new_err(message));
+        }
+        let Some((width, height)) = camera.size() else {
+            let message = "camera: wanted one that knows its picture's size, as batches' do; use camera.with_size";
+            return Err(PyValueError::new_err(message));
+        };
+        let places = x.into_iter().zip(y).map(|(x, y)| [x, y]).collect();
+        let size = Size::new(width, height);
+        let answer = py.detach(|| self.answer(places, secs, *camera.view(), size));
+        let (answer, pose) =
+            answer.ok_or_else(|| PyValueError::new_err("the tracer gave no answer"))?;
+        let state = self.scene().state_at(secs);
+        let (optics, forward) =
+            (camera.optics(size), -camera.view().world_from_camera.matrix3.z_axis);
+        let hits = answer.requests.iter().zip(&answer.surfaces).map(|(request, surface)| {
+            in_world(surface, &pose, &optics.ray(request), forward, &state, self.scene())
+        });
+        let (position, normal): (Vec<_>, Vec<_>) = hits.unzip();
+        let object = answer.surfaces.iter().map(|surface| match surface.object {
+            Surface::SKY => -1,
+            object => i64::from(object),
+        });
+        let object: Vec<i64> = object.collect();
+        let samples = py.import("frameless.samples")?.getattr("Samples")?;
+        samples.call1((
+            array::rows(py, answer.rgb)?,
+            array::rows(py, position)?,
+            array::rows(py, normal)?,
+            array::column(py, object),
+        ))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<frameless.Scene {}: {} objects>", self.scene().name, self.objects())
+    }
+}

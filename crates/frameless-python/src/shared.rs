@@ -1,0 +1,178 @@
+//! An engine that Python's threads share: one at a time, and never while holding the interpreter.
+
+use std::cell::Cell;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use frameless::{BatchLength, Engine, Observation, Time};
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+
+use crate::outside::Outside;
+
+/// What a sampler written in Python has raised, until somebody can be told.
+#[derive(Clone, Default)]
+pub(crate) struct Raised(Arc<Mutex<Option<PyErr>>>);
+
+impl Raised {
+    /// Keeps the first of several.
+    pub(crate) fn set(&self, error: PyErr) {
+        self.slot().get_or_insert(error);
+    }
+
+    pub(crate) fn is_set(&self) -> bool {
+        self.slot().is_some()
+    }
+
+    pub(crate) fn take(&self) -> PyResult<()> {
+        self.slot().take().map_or(Ok(()), Err)
+    }
+
+    fn slot(&self) -> std::sync::MutexGuard<'_, Option<PyErr>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// How many samples are asked for at once.
+pub(crate) enum Length {
+    Fixed(usize),
+    Learned(BatchLength),
+}
+
+impl Length {
+    pub(crate) fn next_length(&mut self) -> usize {
+        match self {
+            Length::Fixed(samples) => *samples,
+            Length::Learned(length) => length.next_length(),
+        }
+    }
+}
+
+/// The engine with what Python wants to know of it besides.
+pub(crate) struct State {
+    pub(crate) engine: Engine<Outside>,
+    pub(crate) length: Length,
+    pub(crate) budget: Option<f64>,
+    pub(crate) is_closed: bool,
+    /// Change d of every pixel when it was traced last; NaN if never.
+    pub(crate) changes: Vec<f32>,
+    /// Which canvas `changes` are of.
+    generation: u32,
+    refreshes: Refreshes,
+}
+
+/// When pictures were made. Whoever never asks for one has them made all the same, since samplers learn from them what is shown.
+#[derive(Default)]
+struct Refreshes {
+    last: Time,
+    cost_secs: f64,
+    unseen: Vec<[f32; 3]>,
+}
+
+/// As a display does.
+const REFRESH_SECS: f64 = 1.0 / 60.0;
+/// Pictures that nobody has asked for take at most a fifth of the time.
+const COSTS_PER_REFRESH: f64 = 5.0;
+
+impl State {
+    pub(crate) fn new(engine: Engine<Outside>, length: Length) -> State {
+        let changes = vec![f32::NAN; engine.canvas().size().pixels()];
+        let generation = engine.canvas().generation();
+        let refreshes = Refreshes::default();
+        State { engine, length, budget: None, is_closed: false, changes, generation, refreshes }
+    }
+
+    /// The picture at `now`.
+    pub(crate) fn picture(&mut self, now: Time, mut memory: Vec<[f32; 3]>) -> Vec<[f32; 3]> {
+        let begin = self.engine.now();
+        self.engine.refresh_into(now, &mut memory);
+        self.refreshes.last = now;
+        self.refreshes.cost_secs = self.engine.now().secs_since(begin);
+        memory
+    }
+
+    /// Makes a picture that nobody sees, if none has been made for long.
+    pub(crate) fn refresh_if_due(&mut self) {
+        let now = self.engine.now();
+        let interval_secs = REFRESH_SECS.max(COSTS_PER_REFRESH * self.refreshes.cost_secs);
+        // The clock's times are rounded down.
+        if now.secs_since(self.refreshes.last) + 1e-9 >= interval_secs {
+            let memory = std::mem::take(&mut self.refreshes.unseen);
+            self.refreshes.unseen = self.picture(now, memory);
+        }
+    }
+
+    /// Notes what the newest answer changed.
+    pub(crate) fn note_changes(&mut self) {
+        self.forget_changes_of_other_sizes();
+        for Observation { pixel, change, known, .. } in self.engine.observations() {
+            self.changes[*pixel as usize] = if *known { *change } else { f32::NAN };
+        }
+    }
+
+    pub(crate) fn forget_changes_of_other_sizes(&mut self) {
+        let canvas = self.engine.canvas();
+        if canvas.generation() != self.generation {
+            self.generation = canvas.generation();
+            self.changes.clear();
+            self.changes.resize(canvas.size().pixels(), f32::NAN);
+        }
+    }
+
+    /// A whole batch has been answered that was handed out at `begin`.
+    pub(crate) fn note_duration(&mut self, samples: usize, begin: Time) {
+        let end = self.engine.now();
+        if let Length::Learned(length) = &mut self.length {
+            length.answered(samples, begin, end);
+        }
+    }
+}
+
+/// A [`State`] behind a lock.
+pub(crate) struct Shared {
+    state: Mutex<State>,
+    raised: Raised,
+}
+
+thread_local! {
+    /// Whether this thread holds a state: its sampler, called back, must not ask for it again.
+    static HOLDS: Cell<bool> = const { Cell::new(false) };
+}
+
+struct Holding;
+
+impl Drop for Holding {
+    fn drop(&mut self) {
+        HOLDS.set(false);
+    }
+}
+
+impl Shared {
+    pub(crate) fn new(state: State, raised: Raised) -> Shared {
+        Shared { state: Mutex::new(state), raised }
+    }
+
+    /// Lets go of the interpreter, waits for the state, and works on it.
+    ///
+    /// # Errors
+    /// If it is called from a sampler that the same thread is running, or if a sampler has raised an exception meanwhile.
+    pub(crate) fn with<R: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut State) -> R + Send,
+    ) -> PyResult<R> {
+        if HOLDS.get() {
+            let message =
+                "a sampler must not use a session or a canvas other than the one it is given";
+            return Err(PyRuntimeError::new_err(message));
+        }
+        let outcome = py.detach(|| {
+            // A panic leaves a canvas with some samples missing, which is nothing special.
+            let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+            HOLDS.set(true);
+            let _holding = Holding;
+            work(&mut state)
+        });
+        self.raised.take()?;
+        Ok(outcome)
+    }
+}

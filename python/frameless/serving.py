@@ -1,0 +1,102 @@
+"""A function in Python, looked at: in the browser, or inline in a notebook."""
+
+import atexit
+import weakref
+from collections.abc import Callable
+from typing import Any
+
+from ._frameless import Camera, Served, start_serving
+
+DEFAULT_CAMERA = Camera(eye=(0.0, 0.0, 5.0), target=(0.0, 0.0, 0.0))
+
+Render = Callable[..., Any]
+"""``render(x, y, time, camera)``: x and y are float32 arrays of shape (n,), pixels from the picture's top-left corner; time is in
+seconds; ``camera.rays(x, y)`` are the rays through them. Returns linear RGB of shape (n, 3), or Samples. With ``noisy`` it is called
+with ``seed``, too: uint32 of shape (n,)."""
+
+_served: "weakref.WeakSet[Served]" = weakref.WeakSet()
+
+
+def serve(
+    render: Render,
+    size: tuple[int, int] = (640, 480),
+    *,
+    camera: Camera = DEFAULT_CAMERA,
+    sampler: str = "adaptive",
+    reconstruction: str = "reproject+antialias",
+    batch_ms: float = 4.0,
+    budget: float | None = None,
+    exposure: float = 0.0,
+    noisy: bool = False,
+    port: int = 0,
+    allow_frame: str = "http://localhost:*",
+) -> Served:
+    """Show a renderer on a web page of this machine, and return at once. The last line of a notebook's cell shows it inline.
+
+    Parameters
+    ----------
+    render : see frameless.serving.Render; called in a thread of its own, with the interpreter held, about every `batch_ms`
+    size : (width, height) of the picture in pixels
+    camera : from where it is looked at first; dragging on the page moves it
+    sampler, reconstruction : by name, as in Session
+    batch_ms : milliseconds that a call of `render` should take; longer if calls are expensive
+    budget : samples per second at most
+    exposure : stops by which radiance is multiplied before it is shown
+    noisy : whether colours have noise; render is then called with seeds
+    port : where the page listens, on this machine only; default: any free port
+    allow_frame : origin of the pages that may show this one inside them, as notebooks do. Default: those that are reached under the
+        name localhost, at any port. A notebook opened as 127.0.0.1 or elsewhere shows no page inline; open `url` then
+
+    Raises OSError if the port is taken, ValueError for values that make no sense.
+    """
+    served = start_serving(
+        render,
+        size,
+        camera,
+        sampler,
+        reconstruction,
+        batch_ms,
+        budget,
+        exposure,
+        noisy,
+        port,
+        allow_frame,
+    )
+    _served.add(served)
+    return served
+
+
+def view(
+    render: Render,
+    size: tuple[int, int] = (640, 480),
+    *,
+    camera: Camera = DEFAULT_CAMERA,
+    open_browser: bool = True,
+    **options: Any,
+) -> None:
+    """Look at a renderer in the browser until Ctrl-C.
+
+    As `serve` (whose other parameters it takes), but opens the page, and waits. What render raises is raised here.
+    """
+    served = serve(render, size, camera=camera, **options)
+    print(f"look at it here: {served.url}    (Ctrl-C ends it)", flush=True)
+    if open_browser:
+        import webbrowser
+
+        webbrowser.open(served.url)
+    try:
+        served.wait()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        served.stop()
+
+
+@atexit.register
+def _stop_all() -> None:
+    for served in list(_served):
+        try:
+            served.stop()
+        except Exception:
+            # Nobody is left to be told.
+            continue

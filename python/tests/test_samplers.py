@@ -1,0 +1,201 @@
+"""Samplers of Python's own are samplers like any other."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import frameless
+from frameless import BuiltinSampler, Canvas, CanvasLike, Observed, Session, testing
+from conftest import pattern
+
+BUILTIN = ("random", "permutation", "change", "adaptive")
+
+
+class Uniform:
+    """Independent, evenly distributed pixels: `random`, in Python."""
+
+    def __init__(self, seed: int) -> None:
+        self.rng = np.random.default_rng(seed)
+
+    def choose(self, now: float, canvas: CanvasLike, count: int) -> Any:
+        return self.rng.integers(0, canvas.time.size, count)
+
+
+class Oldest:
+    """Half of each batch to what has waited longest, half to where something changed last."""
+
+    def __init__(self, seed: int) -> None:
+        self.changed: Any = np.zeros(0, np.uint32)
+
+    def choose(self, now: float, canvas: CanvasLike, count: int) -> Any:
+        oldest = np.argsort(canvas.time, kind="stable")
+        hot = self.changed[self.changed < oldest.size][: count // 2]
+        return np.concatenate([hot, np.resize(oldest, count - len(hot))])
+
+    def observe(self, canvas: CanvasLike, observed: Observed) -> None:
+        self.changed = observed.pixel[observed.known & (observed.change > 0.01)]
+
+
+FACTORIES = {name: (lambda seed, name=name: BuiltinSampler(name, seed)) for name in BUILTIN}
+FACTORIES |= {"Uniform": Uniform, "Oldest": Oldest}
+
+
+@pytest.mark.parametrize("name", FACTORIES)
+def test_every_sampler_passes_the_same_tests(name: str) -> None:
+    testing.check_sampler(FACTORIES[name], every_pixel_within=3.0)
+
+
+class Corner:
+    """No sampler: looks at one pixel only."""
+
+    def __init__(self, seed: int) -> None:
+        pass
+
+    def choose(self, now: float, canvas: CanvasLike, count: int) -> Any:
+        return np.zeros(count, np.int64)
+
+
+class Moody(Uniform):
+    """No sampler: its seed makes no difference."""
+
+    moods = 0
+
+    def __init__(self, seed: int) -> None:
+        Moody.moods += 1
+        super().__init__(Moody.moods)
+
+
+@pytest.mark.parametrize(("wrong", "says"), [(Corner, "767 pixels were never traced"), (Moody, "other choices")])
+def test_what_is_none_does_not(wrong: Any, says: str) -> None:
+    with pytest.raises(AssertionError, match=says):
+        testing.check_sampler(wrong)
+
+
+@pytest.mark.parametrize("name", FACTORIES)
+def test_a_loop_of_parts(name: str) -> None:
+    canvas, sampler = Canvas((40, 30)), FACTORIES[name](1)
+    now = 0.0
+    for turn in range(100):
+        now = 1e-3 * (turn + 1)
+        pixels = sampler.choose(now, canvas, 100)
+        x, y = pixels % 40 + 0.5, pixels // 40 + 0.5
+        observed = canvas.keep(now, pixels, pattern(x, y, 0.0, None))
+        assert len(observed) == len(pixels) and np.array_equal(observed.pixel, pixels)
+        assert (observed.now == pytest.approx(now)) and observed.change[observed.known].max(initial=0.0) == 0.0
+        if hasattr(sampler, "observe"):
+            sampler.observe(canvas, observed)
+    assert canvas.image(now).shape == (30, 40, 3) and canvas.known.mean() > 0.99
+    assert canvas.age(now).min() < 0.002 and canvas.time.max() == pytest.approx(now)
+    assert canvas.rgb.shape == (1200, 3) and canvas.holes.dtype == np.uint32 and canvas.size == (40, 30)
+
+
+def test_a_canvas_checks_what_it_keeps() -> None:
+    canvas = Canvas((4, 3))
+    for arguments, says in [
+        ((0.1, np.array([12]), np.zeros((1, 3))), "from 0 to 11, got 12"),
+        ((0.1, np.array([0]), np.full((1, 3), np.nan)), "sample 0 (pixel 0)"),
+        ((float("nan"), np.array([0]), np.zeros((1, 3))), "now: wanted seconds"),
+        ((-1.0, np.array([0]), np.zeros((1, 3))), "now: wanted seconds"),
+        ((0.1, np.array([0]), np.zeros((2, 3))), "wanted shape (1, 3), got (2, 3)"),
+    ]:
+        with pytest.raises(ValueError) as refused:
+            canvas.keep(*arguments)
+        assert says in str(refused.value)
+    assert not canvas.known.any()
+
+
+def test_what_a_sampler_sees_is_the_canvas() -> None:
+    class Looking(Uniform):
+        seen = 0
+
+        def choose(self, now: float, canvas: CanvasLike, count: int) -> Any:
+            assert canvas.size == (40, 30) and (canvas.time <= now).all()
+            Looking.seen = int(canvas.known.sum())
+            with pytest.raises(ValueError, match="read-only"):
+                canvas.rgb[0] = 1.0
+            return super().choose(now, canvas, count)
+
+        def observe(self, canvas: CanvasLike, observed: Observed) -> None:
+            assert (canvas.time[observed.pixel] >= observed.now - 1e-9).all()
+            wanted = pattern(observed.pixel % 40 + 0.5, observed.pixel // 40 + 0.5, 0.0, None)
+            assert np.allclose(canvas.rgb[observed.pixel], wanted, atol=1e-5)
+
+    for reconstruction in ("hold", "reproject"):
+        session = Session((40, 30), sampler=Looking(1), simulated=20_000.0, reconstruction=reconstruction)
+        session.run(pattern, 0.3)
+        assert Looking.seen > 1100 and session.known().sum() >= Looking.seen
+
+
+@pytest.mark.parametrize(
+    ("answer", "says"),
+    [
+        (lambda count: np.zeros(count - 1, int), "choose: wanted shape"),
+        (lambda count: np.zeros(count), "choose: wanted dtype an integer type"),
+        (lambda count: np.full(count, 1200), "pixel numbers from 0 to 1199, got 1200"),
+        (lambda count: np.full(count, -1), "got -1"),
+    ],
+)
+def test_choices_are_checked(answer: Any, says: str) -> None:
+    class Wrong:
+        def choose(self, now: float, canvas: CanvasLike, count: int) -> Any:
+            return answer(count)
+
+    session = Session((40, 30), sampler=Wrong(), batch=100)
+    with pytest.raises(ValueError) as refused:
+        next(iter(session))
+    assert says in str(refused.value)
+    session.set_sampler("random")
+    assert len(next(iter(session))) == 100, "the session is still usable"
+
+
+class Failing(Uniform):
+    def __init__(self, seed: int, where: str = "choose") -> None:
+        super().__init__(seed)
+        self.where, self.calls = where, 0
+
+    def fail(self, where: str) -> None:
+        self.calls += 1
+        if where == self.where and self.calls > 5:
+            raise LookupError(f"nothing to {where}")
+
+    def choose(self, now: float, canvas: CanvasLike, count: int) -> Any:
+        self.fail("choose")
+        return super().choose(now, canvas, count)
+
+    def observe(self, canvas: CanvasLike, observed: Observed) -> None:
+        self.fail("observe")
+
+
+@pytest.mark.parametrize("where", ["choose", "observe"])
+def test_what_a_sampler_raises_arrives_as_it_is(where: str) -> None:
+    session = Session((40, 30), sampler=Failing(1, where), batch=10)
+    with pytest.raises(LookupError, match=f"nothing to {where}"):
+        session.run(pattern, 1.0)
+    session.set_sampler(Uniform(1))
+    assert session.run(pattern, 0.1) > 0
+    with pytest.raises(LookupError, match=f"nothing to {where}"):
+        frameless.compare(
+            algorithms=[("failing", lambda seed: Failing(seed, where))], size=(32, 24), samples_per_sec=9_000, seconds=1
+        )
+
+
+def test_a_sampler_must_not_use_its_own_session() -> None:
+    class Curious(Uniform):
+        def choose(self, now: float, canvas: CanvasLike, count: int) -> Any:
+            session.image()
+
+    session = Session((40, 30), sampler=Curious(1))
+    with pytest.raises(RuntimeError, match="must not use a session"):
+        next(iter(session))
+
+
+@pytest.mark.parametrize("sampler", [7, object(), Uniform])
+def test_what_is_no_sampler_is_refused(sampler: Any) -> None:
+    if sampler is Uniform:
+        session = Session((4, 4), sampler=sampler)
+        with pytest.raises(TypeError):
+            next(iter(session))
+    else:
+        with pytest.raises(TypeError, match="wanted a name or an object with a method choose"):
+            Session((4, 4), sampler=sampler)

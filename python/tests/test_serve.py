@@ -1,0 +1,169 @@
+"""A renderer on a page: it answers, it stops, and what the renderer raises is not lost."""
+
+import time
+import urllib.error
+import urllib.request
+from typing import Any
+
+import numpy as np
+import pytest
+
+import frameless
+from frameless import Samples, serve
+from conftest import pattern
+
+
+def get(url: str, then: str | None = None) -> tuple[int, str]:
+    """What a browser gets at a URL, and at another one after it with the cookies of the first."""
+    browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+    try:
+        with browser.open(url, timeout=10) as answer:
+            found = answer.status, answer.read().decode()
+        if then is not None:
+            with browser.open(then, timeout=10) as answer:
+                found = answer.status, answer.read().decode()
+        return found
+    except urllib.error.HTTPError as error:
+        return error.code, error.read().decode()
+
+
+def wait_for(condition: Any) -> None:
+    end = time.perf_counter() + 10.0
+    while not condition():
+        assert time.perf_counter() < end, "it did not happen within 10 s"
+        time.sleep(0.01)
+
+
+def test_a_page_is_served_to_who_knows_the_secret() -> None:
+    calls = []
+
+    def render(x: Any, y: Any, t: float, camera: frameless.Camera) -> Any:
+        calls.append((len(x), camera.size))
+        return pattern(x, y, t, camera)
+
+    served = serve(render, (64, 48))
+    try:
+        assert served.running and served.size == (64, 48) and "127.0.0.1" in served.url
+        plain = served.url.partition("?")[0]
+        status, page = get(served.url, then=plain)
+        assert status == 200 and "<canvas" in page
+        assert get(plain)[0] in (401, 403), "without the secret"
+        wait_for(lambda: sum(n for n, _ in calls) > 64 * 48)
+        assert {size for _, size in calls} == {(64, 48)}
+        # Notebooks are reached as localhost: as another host the page's cookie would be a stranger's.
+        assert served.url.replace("127.0.0.1", "localhost") in served._repr_html_()
+        with urllib.request.urlopen(served.url) as answer:
+            assert "frame-ancestors http://localhost:*" in answer.headers["Content-Security-Policy"]
+    finally:
+        served.stop()
+    assert not served.running and "stopped" in repr(served)
+    with pytest.raises(OSError):
+        urllib.request.urlopen(served.url, timeout=2)
+    served.stop()
+
+
+def test_batches_of_calls_that_have_a_price_grow() -> None:
+    lengths = []
+
+    def slow(x: Any, *_: object) -> Any:
+        lengths.append(len(x))
+        time.sleep(0.005)
+        return np.zeros((len(x), 3))
+
+    served = serve(slow, (200, 150))
+    try:
+        wait_for(lambda: lengths and max(lengths) > 2_000)
+    finally:
+        served.stop()
+    assert lengths[0] < 50
+
+
+def test_surfaces_and_seeds_are_asked_for_alike() -> None:
+    seen = []
+
+    def render(x: Any, y: Any, t: float, camera: frameless.Camera, seed: Any) -> Samples:
+        seen.append(seed.dtype)
+        origin, direction = camera.rays(x, y)
+        return Samples(pattern(x, y, t, camera), origin + 5.0 * direction, object_id=np.zeros(len(x), int))
+
+    served = serve(render, (64, 48), noisy=True, camera=frameless.Camera((0, 0, 5), (0, 0, 0)))
+    wait_for(lambda: len(seen) > 20)
+    served.stop()
+    assert set(seen) == {np.dtype(np.uint32)}
+
+
+def test_what_the_renderer_raises_arrives_and_another_goes_on() -> None:
+    error = KeyError("lamp")
+
+    def broken(*_: object) -> Any:
+        raise error
+
+    served = serve(broken, (32, 24))
+    try:
+        wait_for(lambda: served.failed)
+        assert served.running
+        with pytest.raises(KeyError) as caught:
+            served.check()
+        assert caught.value is error
+        calls = []
+
+        def mended(x: Any, *_: object) -> Any:
+            calls.append(len(x))
+            return np.zeros((len(x), 3))
+
+        served.set_render(mended)
+        wait_for(lambda: len(calls) > 10)
+        served.check()
+        served.set_render(lambda x, y, t, c: np.zeros(3))
+        with pytest.raises(ValueError, match="rgb: wanted shape"):
+            served.wait(10.0)
+        assert not served.running, "waiting ends with the error"
+    finally:
+        served.stop()
+
+
+def test_waiting_ends_in_time() -> None:
+    served = serve(pattern, (32, 24))
+    begin = time.perf_counter()
+    served.wait(0.3)
+    assert 0.25 < time.perf_counter() - begin < 2.0 and served.running
+    served.stop()
+    served.wait()
+
+
+def test_view_raises_what_render_raises(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+
+    def broken(*_: object) -> Any:
+        raise ZeroDivisionError("nothing there")
+
+    with pytest.raises(ZeroDivisionError, match="nothing there"):
+        frameless.view(broken, (32, 24))
+    assert len(opened) == 1 and opened[0] in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ({"render": 7}, "render: wanted a function"),
+        ({"size": (0, 1)}, "at least 1"),
+        ({"sampler": "chance"}, "chance"),
+        ({"reconstruction": "bogus"}, "bogus"),
+        ({"batch_ms": 0.0}, "batch_ms"),
+        ({"budget": -1.0}, "budget"),
+        ({"exposure": float("nan")}, "exposure"),
+    ],
+)
+def test_nonsense_is_refused(arguments: dict[str, Any], says: str) -> None:
+    with pytest.raises(ValueError) as refused:
+        serve(**{"render": pattern, "size": (32, 24), **arguments})
+    assert says in str(refused.value)
+
+
+def test_a_port_that_is_taken_is_said() -> None:
+    served = serve(pattern, (32, 24))
+    port = int(served.url.split(":")[2].split("/")[0])
+    with pytest.raises(OSError, match=f"port {port} is taken"):
+        serve(pattern, (32, 24), port=port)
+    served.stop()
