@@ -84,15 +84,16 @@ impl Subject {
     /// Where everything is in a picture of `size` at `secs`.
     pub fn pose(&self, secs: f64, size: Size) -> Pose {
         let (moment, mut pose) = (self.moment(secs), Pose::default());
-        moment.pose(&self.view(moment.state(), secs), size, &mut pose);
+        self.world.pose(&moment, &self.view(moment.state(), secs), size, &mut pose);
         pose
     }
 
     /// Whether nothing that can be seen differs between two times: neither camera nor object nor light.
     pub fn is_still(&self, a_secs: f64, b_secs: f64) -> bool {
         let (a, b) = (self.state(a_secs), self.state(b_secs));
-        let same_state =
-            a.world_from_node == b.world_from_node && a.light_intensity == b.light_intensity;
+        let same_state = a.world_from_node == b.world_from_node
+            && a.light_intensity == b.light_intensity
+            && a.morph_weights == b.morph_weights;
         same_state && self.view(&a, a_secs) == self.view(&b, b_secs)
     }
 
@@ -175,13 +176,13 @@ impl Tracer for SubjectTracer<'_> {
     fn pose(&mut self, scene_secs: f64, size: Size, pose: &mut Pose) -> bool {
         self.subject.update_moment(scene_secs, &mut self.moment);
         let view = self.subject.view(self.moment.state(), scene_secs);
-        self.moment.pose(&view, size, pose);
+        self.subject.world.pose(&self.moment, &view, size, pose);
         true
     }
 
     fn lighting(&mut self, scene_secs: f64, lighting: &mut Lighting) -> bool {
         self.subject.update_moment(scene_secs, &mut self.moment);
-        self.moment.lighting(lighting);
+        self.subject.world.lighting(&self.moment, lighting);
         true
     }
 }

@@ -75,9 +75,43 @@ impl Camera {
 
     /// Where directions are in the picture; `None` if all rays are parallel.
     pub(crate) fn picture_from_direction(&self) -> Option<PictureFrom> {
-        let world_from_camera = Affine3A { matrix3: self.axes, translation: Vec3A::ZERO };
-        let camera_from_world = DMat4::from(wide(&world_from_camera).inverse());
-        self.is_perspective.then(|| rows(self.picture_from_camera() * camera_from_world))
+        self.picture_from_directions(Mat3A::IDENTITY)
+    }
+
+    /// As [`Camera::picture_from_direction`], for directions given in some coordinates.
+    pub(crate) fn picture_from_directions(&self, world_from_local: Mat3A) -> Option<PictureFrom> {
+        let turn = |matrix3| wide(&Affine3A { matrix3, translation: Vec3A::ZERO });
+        let camera_from_local = DMat4::from(turn(self.axes).inverse() * turn(world_from_local));
+        self.is_perspective.then(|| rows(self.picture_from_camera() * camera_from_local))
+    }
+
+    /// The depth of a plane at (column, row, 1) = p in the picture, as (n, d) with depth = n · p / d · p; where the plane is seen,
+    /// d · p is positive.
+    pub(crate) fn depth_of_plane(&self, point: Vec3A, normal: Vec3A) -> [[f32; 3]; 2] {
+        let towards_camera = if self.is_before(point, normal) { normal } else { -normal };
+        let n = self.axes.transpose() * towards_camera;
+        let distance = towards_camera.dot(self.position - point);
+        let [half_width, half_height] = self.half;
+        let [width, height] = [self.size.width as f32, self.size.height as f32];
+        // n · (x, y, 0) with x = (2 column / width − 1) · half_width, and y likewise upwards.
+        let [a, b, c] = [
+            2.0 * n.x * half_width / width,
+            -2.0 * n.y * half_height / height,
+            n.y * half_height - n.x * half_width,
+        ];
+        if self.is_perspective {
+            // (x, y, −1) · depth on the plane: depth n · (x, y, −1) = −distance.
+            [[0.0, 0.0, distance], [-a, -b, n.z - c]]
+        } else {
+            // (x, y, −depth) on the plane: n · (x, y, 0) − depth n_z = −distance.
+            [[a, b, c + distance], [0.0, 0.0, n.z]]
+        }
+    }
+
+    /// Whether a plane is seen from the side of its normal.
+    pub(crate) fn is_before(&self, point: Vec3A, normal: Vec3A) -> bool {
+        let from_plane = if self.is_perspective { self.position - point } else { self.axes.z_axis };
+        from_plane.dot(normal) > 0.0
     }
 
     /// Rows as in [`frameless::Projection`]; the camera looks along −z.
@@ -153,6 +187,30 @@ mod tests {
                     let off = (0..2).map(|k| (there.px[k] - expected[k]).abs()).fold(0.0, f32::max);
                     assert!(off < 1e-3, "{expected:?}: {there:?}");
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn the_depth_of_a_plane_is_where_rays_meet_it() {
+        let world_from_camera = Affine3A::from_translation(Vec3::new(1.0, 2.0, -3.0))
+            * Affine3A::from_rotation_y(0.7)
+            * Affine3A::from_rotation_x(-0.3);
+        let size = Size::new(64, 36);
+        let ahead = world_from_camera.transform_point3a(Vec3A::new(0.2, 0.1, -5.0));
+        let turned = world_from_camera.transform_vector3a(Vec3A::new(0.3, -0.4, 0.9)).normalize();
+        for projection in
+            [Projection::Perspective { yfov_rad: 0.9 }, Projection::Orthographic { ymag: 3.0 }]
+        {
+            let camera = Camera::new(&View { world_from_camera, projection }, size);
+            for (normal, pixel) in [(turned, 0), (-turned, 700), (turned, size.index(63, 35))] {
+                let [n, d] = camera.depth_of_plane(ahead, normal);
+                let request = Request { pixel, offset: [0.25, -0.125], sample_index: 0 };
+                let (ray, [x, y]) = (camera.ray(&request), request.position_px(size));
+                let [n, d] = [n, d].map(|row| row[0] * x + row[1] * y + row[2]);
+                let t = (ahead - ray.origin).dot(normal) / ray.direction.dot(normal);
+                let want = t * ray.direction.dot(-camera.axes.z_axis);
+                assert!(d > 0.0 && (n / d - want).abs() < 1e-4 * want, "{pixel}: {n}/{d}, {want}");
             }
         }
     }

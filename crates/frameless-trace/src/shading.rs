@@ -161,7 +161,8 @@ fn a_mirror_shows_what_is_opposite() {
     scene.sky = [Vec3::ZERO, Vec3::splat(0.25)];
     // In at 45°, out at 45°, to the glowing ball, tinted.
     let (rgb, surface) = looking(scene.clone(), Vec3::new(-4.0, 4.0, 0.0), Vec3::ZERO);
-    assert_eq!((rgb, surface.object), ([0.5, 2.0, 3.0], 0));
+    // The ball's image in the front of the only mirror: after two objects and the floor's image.
+    assert_eq!((rgb, surface.object), ([0.5, 2.0, 3.0], 3));
     let (rgb, _) = looking(scene.clone(), Vec3::new(-0.01, 4.0, 0.0), Vec3::ZERO);
     assert_near(rgb[1], 0.25, 1e-3);
     let no_mirrors = Settings { max_depth: 0, ..Settings::default() };

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use frameless::{
-    Clock, Display, Engine, Pose, ReconstructionKind, Request, Rng, SamplerKind, Size, Surface,
-    Time,
+    Clock, Display, Engine, Lighting, Pose, ReconstructionKind, Request, Rng, SamplerKind, Size,
+    Surface, Time,
 };
 use frameless_scene::{Projection, Scene, View, builtin};
 use frameless_trace::{CpuTracer, Settings, ViewSource, World, render, thread_pool};
@@ -22,17 +22,19 @@ fn request_at(size: Size, [x, y]: [f32; 2]) -> Option<Request> {
     inside.then(|| Request { pixel: size.index(x as u32, y as u32), offset, sample_index: 0 })
 }
 
-/// How many of `tries` random samples at `then_secs` are seen again at `now_secs`; panics if one is neither seen nor covered.
-fn seen_again(name: &str, [then_secs, now_secs]: [f64; 2], tries: u32) -> u32 {
+/// How many of 2,000 random samples at `then_secs` are seen again at `now_secs`; panics if one is neither seen nor covered. `views`:
+/// from where it is looked then and now; `None`: through the scene's camera.
+fn seen_again(name: &str, [then_secs, now_secs]: [f64; 2], views: Option<[View; 2]>) -> u32 {
     let size = Size::new(512, 384);
     let world = world(name);
     let [then, now] = [then_secs, now_secs].map(|secs| world.moment(secs));
-    let [view_then, view_now] = [&then, &now].map(|m| world.scene().view_at(m.state(), 0));
+    let [view_then, view_now] =
+        views.unwrap_or_else(|| [&then, &now].map(|m| world.scene().view_at(m.state(), 0)));
     let mut pose = Pose::default();
-    now.pose(&view_now, size, &mut pose);
+    world.pose(&now, &view_now, size, &mut pose);
     let mut rng = Rng::new(7);
     let mut seen = 0;
-    for _ in 0..tries {
+    for _ in 0..2000 {
         let pixel = rng.below(size.pixels() as u32);
         let offset = [rng.unit_f32() - 0.5, rng.unit_f32() - 0.5];
         let request = Request { pixel, offset, sample_index: 0 };
@@ -57,11 +59,48 @@ fn seen_again(name: &str, [then_secs, now_secs]: [f64; 2], tries: u32) -> u32 {
 #[test]
 fn what_was_hit_is_hit_again_where_it_is_said_to_be() {
     // Nothing moves; a sphere rolls; spheres and boxes fly and spin; the camera goes round; all of that.
-    assert!(seen_again("sphere", [0.4, 0.4], 2000) > 1990);
+    assert!(seen_again("sphere", [0.4, 0.4], None) > 1990);
     for name in ["sphere", "many", "orbit", "mix"] {
-        let seen = seen_again(name, [0.4, 0.45], 2000);
+        let seen = seen_again(name, [0.4, 0.45], None);
         assert!(seen > 1700, "{name}: {seen} of 2000");
     }
+}
+
+#[test]
+fn what_was_seen_in_a_mirror_is_seen_again_where_its_image_is() {
+    // Near the standing mirror, which fills most of the picture; past its edge; from behind it.
+    let here = view(Vec3::new(-1.9, 1.8, 4.9), 0.4);
+    for (there, least) in [
+        (here, 1980),
+        (view(Vec3::new(-1.7, 1.9, 4.8), 0.45), 1500),
+        (view(Vec3::new(-1.0, 1.7, 4.6), 0.9), 400),
+        (view(Vec3::new(-4.0, 1.8, -0.2), 0.4 + std::f32::consts::PI), 0),
+    ] {
+        let still = seen_again("shadow", [0.4, 0.4], Some([here, there]));
+        assert!(still >= least, "{there:?}: {still} of 2000");
+        let moving = seen_again("shadow", [0.4, 0.45], Some([here, there]));
+        assert!(moving + 100 >= least, "{there:?}: {moving} of 2000");
+    }
+}
+
+#[test]
+fn what_is_seen_in_a_mirror_is_shaded_where_it_is() {
+    let world = world("shadow");
+    let (moment, here) = (world.moment(0.4), view(Vec3::new(-1.9, 1.8, 4.9), 0.4));
+    let mut lighting = Lighting::default();
+    world.lighting(&moment, &mut lighting);
+    let objects = world.scene().instances.len() as u32;
+    let mut images = 0;
+    for pixel in 0..SIZE.pixels() as u32 {
+        let request = Request::centre(pixel);
+        let (_, surface) = world.trace(&moment, &here, SIZE, &request, &Settings::default());
+        let Some(direct) = lighting.direct(&surface) else { continue };
+        images += u32::from(surface.object >= objects);
+        for (direct, want) in direct.into_iter().zip(surface.direct) {
+            assert!((direct - want).abs() <= 1e-3 * want.max(0.01), "{surface:?}: {direct}");
+        }
+    }
+    assert!(images > SIZE.pixels() as u32 / 4, "{images} pixels show something in the mirror");
 }
 
 fn view(position: Vec3, yaw_rad: f32) -> View {
@@ -116,12 +155,35 @@ fn objects_may_come_through_the_camera() {
 }
 
 #[test]
+fn a_mirror_at_rest_shows_what_it_should_after_a_flight_around_it() {
+    let world = world("shadow");
+    // From before the mirror to behind it, and back.
+    let at = |k: u64| {
+        let k = k.min(40) as f32;
+        let z = 4.9 - 5.0 * (k * std::f32::consts::PI / 40.0).sin();
+        view(Vec3::new(-1.6, 1.8, z), 0.5)
+    };
+    let mut engine = engine(&world, at(0), 80_000.0);
+    for k in 1..=40 {
+        play(&mut engine, k, at(k));
+    }
+    let (now, scene_secs) = (engine.now(), 40.0 / 60.0);
+    engine.timeline_mut().seek(now, scene_secs);
+    engine.timeline_mut().pause(now);
+    let mut picture = Vec::new();
+    for k in 41..=100 {
+        picture = play(&mut engine, k, at(k));
+    }
+    assert_eq!(rmse(&picture, &ideal(&world, at(40), scene_secs)), 0.0);
+}
+
+#[test]
 fn what_is_behind_the_camera_has_no_place_in_the_picture() {
     let world = world("orbit");
     let (moment, mut pose) = (world.moment(0.0), Pose::default());
     let (here, beyond) =
         (view(Vec3::new(0.0, 1.0, 9.0), 0.0), view(Vec3::new(0.0, 1.0, -9.0), 0.0));
-    moment.pose(&beyond, SIZE, &mut pose);
+    world.pose(&moment, &beyond, SIZE, &mut pose);
     for x in 0..SIZE.width {
         let request = Request::centre(SIZE.index(x, SIZE.height * 3 / 4));
         let (_, floor) = world.trace(&moment, &here, SIZE, &request, &Settings::default());

@@ -60,7 +60,7 @@ pub use samplers::{
 pub use weights::{Gaze, WeightError, Weights};
 
 pub use lighting::{Arriving, Light, Lighting, Placement};
-pub use pose::{Deformed, Pose, Projected, Projection};
+pub use pose::{Deformed, Pose, Projected, Projection, Window};
 pub use tracer::{Function, Tracer};
 
 pub use canvas::Canvas;

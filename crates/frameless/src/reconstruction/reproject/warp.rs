@@ -6,8 +6,9 @@
 //! the other moves to the neighbouring cell on its side, if that is empty; so it is with samples whose surface is not known.
 
 use super::store::{Anchor, EMPTY, Layout, SCREEN, Store};
+use crate::pose::BEHIND;
 use crate::wide::{self, F8, M8, Unit};
-use crate::{Pose, Surface};
+use crate::{Pose, Surface, Window};
 
 /// Depths within this ratio belong to the same surface.
 const SAME_SURFACE: f32 = 0.015;
@@ -310,12 +311,44 @@ fn carry_eight<U: Unit>(store: &Store, pose: &Pose, object: u32, start: usize) -
         F8::splat(a) * x + F8::splat(b) * y + (F8::splat(c) * z + F8::splat(d))
     };
     let w = row(3);
-    let in_front = F8::splat(0.0).less_than(w);
     let per_w = F8::splat(1.0) / w;
+    let px = [row(0) * per_w, row(1) * per_w];
     let infinite = if object == Surface::SKY { f32::INFINITY } else { 0.0 };
-    There {
-        px: F8::all_or([row(0) * per_w, row(1) * per_w], in_front, [gone; 2]),
-        depth: row(2) + F8::splat(infinite),
+    let mut there = There { px, depth: row(2) + F8::splat(infinite) };
+    let mut is_seen = F8::splat(0.0).less_than(w);
+    if let Some(window) = pose.window(object) {
+        is_seen = is_seen.and(there.is_in(window));
+    } else {
+        for window in &pose.windows {
+            is_seen = is_seen.and(there.is_hidden_by(window).not());
+        }
+    }
+    there.px = F8::all_or(px, is_seen, [gone; 2]);
+    there
+}
+
+impl<U: Unit> There<U> {
+    /// [`Window::contains`], eight at a time.
+    #[inline(always)]
+    fn is_in(&self, window: &Window) -> M8<U> {
+        let mut outside = M8::splat(0);
+        for edge in &window.edges {
+            outside = outside.either(self.at(edge).less_than(F8::splat(0.0)));
+        }
+        outside.not()
+    }
+
+    /// [`Window::hides`], eight at a time.
+    #[inline(always)]
+    fn is_hidden_by(&self, window: &Window) -> M8<U> {
+        let [n, d] = [self.at(&window.depth[0]), self.at(&window.depth[1])];
+        let is_behind = (n * F8::splat(BEHIND)).less_than(self.depth * d);
+        if is_behind.any() { is_behind.and(self.is_in(window)) } else { is_behind }
+    }
+
+    #[inline(always)]
+    fn at(&self, &[a, b, c]: &[f32; 3]) -> F8<U> {
+        F8::splat(a) * self.px[0] + (F8::splat(b) * self.px[1] + F8::splat(c))
     }
 }
 
