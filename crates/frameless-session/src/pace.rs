@@ -11,6 +11,8 @@ use frameless::Time;
 #[derive(Clone, Debug, Default)]
 pub struct Pace {
     due: Time,
+    // When the next one might be, if somebody waits for it.
+    soonest: Time,
     paint_secs: f64,
 }
 
@@ -22,6 +24,8 @@ const LONGEST_SECS: f64 = 1.0 / 20.0;
 const PAINT_SHARE: f64 = 0.25;
 // Of the loop's time, for making pictures. More starves the samples of which they are made.
 const REFRESH_SHARE: f64 = 1.0 / 3.0;
+// The same where a user has just done something and looks for the answer.
+const HURRIED_SHARE: f64 = 0.5;
 // Whatever a picture costs, the next comes after this at the latest.
 const LONGEST_REST_SECS: f64 = 1.0;
 // Of the newest paint in the learned cost: one slow paint is no reason to slow down.
@@ -38,9 +42,17 @@ impl Pace {
     /// Told when a picture is ready, and what making it cost in seconds of the render loop. The samples get their share before
     /// the next one: at once and not on average, since the first pictures of a large window cost most.
     pub fn made(&mut self, now: Time, refresh_secs: f64) {
-        let rest_secs = refresh_secs * (1.0 / REFRESH_SHARE - 1.0);
-        let rested = Time::from_secs(now.secs() + rest_secs.min(LONGEST_REST_SECS));
-        self.due = self.due.max(rested);
+        let rested = |share: f64| {
+            let rest_secs = refresh_secs * (1.0 / share - 1.0);
+            Time::from_secs(now.secs() + rest_secs.min(LONGEST_REST_SECS))
+        };
+        self.soonest = self.soonest.max(rested(HURRIED_SHARE));
+        self.due = self.due.max(rested(REFRESH_SHARE));
+    }
+
+    /// Told when somebody has done something: the next picture shows it, and may come a little earlier than it would.
+    pub fn hurry(&mut self) {
+        self.due = self.due.min(self.soonest);
     }
 
     /// Whether a picture is due; if so, the next one is due an interval later.
@@ -50,6 +62,7 @@ impl Pace {
         }
         // What was missed is not made up for.
         self.due = Time::from_secs(now.secs() + self.interval_secs());
+        self.soonest = Time::from_secs(now.secs() + SHORTEST_SECS);
         true
     }
 
@@ -84,6 +97,23 @@ mod tests {
         assert_eq!(pace.interval_secs(), LONGEST_SECS);
         pace.painted(f64::NAN);
         assert_eq!(pace.interval_secs(), LONGEST_SECS);
+    }
+
+    #[test]
+    fn whoever_has_done_something_waits_for_half_of_the_loop_at_most() {
+        let ms = |ms: u64| Time(ms * 1_000_000);
+        let mut pace = Pace::default();
+        assert!(pace.is_due(ms(1000)));
+        pace.made(ms(1030), 0.03);
+        assert!(!pace.is_due(ms(1061)));
+        pace.hurry();
+        assert!(!pace.is_due(ms(1059)));
+        assert!(pace.is_due(ms(1061)));
+        // A cheap picture comes at the display's rate, hurried or not.
+        pace.made(ms(1062), 0.001);
+        pace.hurry();
+        assert!(!pace.is_due(ms(1075)));
+        assert!(pace.is_due(ms(1077)));
     }
 
     #[test]

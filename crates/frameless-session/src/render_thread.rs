@@ -96,7 +96,12 @@ fn run<S: Stage>(
                     pace.painted(paint_secs);
                     wanted = Some(memory);
                 }
-                Ok(command) => session.apply(command),
+                Ok(command) => {
+                    if let Command::Mark(_) = command {
+                        pace.hurry();
+                    }
+                    session.apply(command);
+                }
                 Err(TryRecvError::Empty) => break,
                 Err(TryRecvError::Disconnected) => return,
             }

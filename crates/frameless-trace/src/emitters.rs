@@ -138,7 +138,7 @@ impl Emitters {
     }
 }
 
-/// A triangle's corners now; `None` if it is none, or deforms.
+/// A triangle's corners now, if its instance is a mesh; as it was modelled, should the mesh deform: such are not asked.
 fn in_world(world: &World, moment: &Moment, instance: u32, primitive: u32) -> Option<[Vec3A; 3]> {
     let scene = world.scene();
     let geometry = scene.instances[instance as usize].geometry;

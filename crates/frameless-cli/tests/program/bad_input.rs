@@ -80,14 +80,6 @@ fn pixels_and_cameras_outside_are_refused() {
     beyond.refused(2, "camera 999");
 }
 
-/// An environment that cannot show a window is nobody's bad input.
-#[test]
-#[cfg(target_os = "linux")]
-fn without_a_display_the_view_names_another_way() {
-    let run = frameless::<&str>(&[]).refused(1, "display");
-    assert!(run.err.contains("frameless compare"), "{}", run.err);
-}
-
 #[test]
 #[cfg(target_os = "linux")]
 fn output_that_nobody_reads_is_no_error() {

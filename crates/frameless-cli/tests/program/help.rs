@@ -2,7 +2,7 @@
 
 use crate::run::frameless;
 
-const SUBCOMMANDS: [&str; 6] = ["view", "compare", "render", "trace", "info", "scenes"];
+const SUBCOMMANDS: [&str; 7] = ["view", "serve", "compare", "render", "trace", "info", "scenes"];
 
 #[test]
 fn the_main_help_names_every_subcommand_and_the_exit_codes() {

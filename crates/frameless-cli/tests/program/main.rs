@@ -6,3 +6,4 @@ mod compare;
 mod good_input;
 mod help;
 mod run;
+mod serve;

@@ -38,12 +38,18 @@ impl Run {
 }
 
 /// The program with no display, so that no test opens a window.
-pub(crate) fn frameless<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Run {
+pub(crate) fn program<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_frameless"));
     command.args(arguments).stdin(Stdio::null());
     for display in ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"] {
         command.env_remove(display);
     }
+    command
+}
+
+/// The program, run to its end.
+pub(crate) fn frameless<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Run {
+    let mut command = program(arguments);
     let start = Instant::now();
     let Output { status, stdout, stderr } = command.output().expect("the program starts");
     Run {

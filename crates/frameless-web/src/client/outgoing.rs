@@ -135,3 +135,51 @@ pub(super) fn status(status: &Status, pixels: usize) -> StatusMessage {
         ..StatusMessage::default()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use frameless::Size;
+
+    use super::*;
+    use crate::tiles::{Publisher, picture, published};
+    use crate::wire::LONGEST_MESSAGE;
+
+    /// The largest picture, of noise: nothing compresses worse.
+    fn noise(seed: u32) -> Arc<Published> {
+        let size = Size::new(3840, 2160);
+        let mut state = seed;
+        let mut byte = || {
+            // Marsaglia 2003: xorshift.
+            state ^= state << 13;
+            state ^= state >> 17;
+            state ^= state << 5;
+            state as u8
+        };
+        let rgba = (0..size.pixels()).map(|_| [byte(), byte(), byte(), 255]).collect();
+        let now = Instant::now();
+        published(Publisher::new(now).take(picture(size, rgba), Vec::new(), false, now))
+    }
+
+    #[test]
+    fn a_client_takes_at_most_8_mib_whatever_it_is_shown() {
+        let picture = noise(1);
+        let room = Room { bytes: 4 << 20, window: 4 << 20, client: 1, sequence: 1 };
+        let mut outgoing = Outgoing::new(Instant::now());
+        let mut largest = 0;
+        let mut lossless = 0;
+        for _ in 0..40 {
+            let ready = outgoing.make(Arc::clone(&picture), &room);
+            outgoing = ready.outgoing;
+            if let Some(message) = ready.message {
+                let header = TilesHeader::parse(&message).expect("tiles").0;
+                lossless += u32::from(header.lossless);
+                // The payload before it becomes a message, the message, and the same in the socket's buffer.
+                largest = largest.max(outgoing.memory.capacity() + 3 * message.len());
+            }
+            std::thread::sleep(Duration::from_millis(8));
+        }
+        let bytes = largest + outgoing.seen.bytes() + LONGEST_MESSAGE;
+        assert!(lossless > 0, "both kinds of messages are tried");
+        assert!(bytes <= 8 << 20, "{bytes} bytes");
+    }
+}

@@ -13,3 +13,6 @@ pub(crate) use flow::Flow;
 pub(crate) use grid::{Grid, SIDE};
 pub(crate) use publish::{Published, Publisher, Taken};
 pub(crate) use seen::Seen;
+
+#[cfg(test)]
+pub(crate) use publish::tests::{picture, published};

@@ -205,12 +205,12 @@ fn digest(grid: &Grid, tile: usize, rgba: &[[u8; 4]]) -> u64 {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use frameless_session::{Ages, Status};
 
     use super::*;
 
-    pub(in crate::tiles) fn picture(size: Size, rgba: Vec<[u8; 4]>) -> Picture {
+    pub(crate) fn picture(size: Size, rgba: Vec<[u8; 4]>) -> Picture {
         let status = Status {
             scene_secs: 0.0,
             samples_per_sec: 0.0,
@@ -227,7 +227,7 @@ pub(super) mod tests {
         picture(SIZE, vec![[level, level, level, 255]; SIZE.pixels()])
     }
 
-    pub(in crate::tiles) fn published(taken: Taken) -> Arc<Published> {
+    pub(crate) fn published(taken: Taken) -> Arc<Published> {
         match taken {
             Taken::New(published) => published,
             Taken::Same(_) => panic!("not published"),

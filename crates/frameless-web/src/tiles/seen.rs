@@ -68,6 +68,12 @@ impl Seen {
         Seen { generation: 0, tiles: Vec::new() }
     }
 
+    /// What this takes.
+    #[cfg(test)]
+    pub(crate) fn bytes(&self) -> usize {
+        self.tiles.capacity() * size_of::<Tile>()
+    }
+
     /// Picks what to send of the picture: visible changes, or else (or with `refine`) what is ripe for refinement. `now_ms` is a
     /// clock of the caller's that begins above 0.
     ///
@@ -177,8 +183,7 @@ mod tests {
     use frameless::Size;
 
     use super::*;
-    use crate::tiles::publish::tests::{picture, published};
-    use crate::tiles::{Publisher, SIDE};
+    use crate::tiles::{Publisher, SIDE, picture, published};
 
     const SIZE: Size = Size { width: 4 * SIDE, height: SIDE };
     const PLENTY: [usize; 2] = [100, 100];
@@ -301,8 +306,7 @@ mod tests {
         let shown = published(Publisher::new(now).take(black, Vec::new(), false, now));
         let mut seen = Seen::nothing();
         assert_eq!(seen.choose(&shown, 1, [usize::MAX; 2], true).tiles.len(), MOST_TILES);
-        let bytes = seen.tiles.len() * size_of::<Tile>();
         assert_eq!(size_of::<Tile>(), 40);
-        assert!(bytes < 400_000, "{bytes} bytes for the largest picture");
+        assert!(seen.bytes() < 400_000, "{} bytes for the largest picture", seen.bytes());
     }
 }

@@ -183,12 +183,14 @@ class View:
 
 # What the page tells of what it draws, counted from its beginning.
 LISTEN = """
-window.seen = { drawn: 0, last: 0, pictures: 0, picture: 0, latencies: [] };
+window.seen = { drawn: 0, last: 0, pictures: 0, picture: 0, begun: 0, latencies: [] };
 document.addEventListener("frameless:drawn", ({ detail }) => {
   seen.drawn++;
   seen.last = performance.now();
-  if (detail.picture !== seen.picture) seen.pictures++;
+  if (detail.picture === seen.picture) return;
+  seen.pictures++;
   seen.picture = detail.picture;
+  seen.begun = seen.last;
 });
 document.addEventListener("frameless:latency", (event) => seen.latencies.push(event.detail));
 """
