@@ -6,6 +6,8 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Parser, Subcommand};
 use frameless::{ReconstructionKind, Size};
+use frameless_scene::{AnimationChoice, Pick};
+use frameless_trace::{Integrator, Settings};
 
 use crate::failure::Failure;
 use crate::parse;
@@ -70,6 +72,7 @@ pub(crate) enum Command {
 #[command(after_help = "Examples:
   frameless view
   frameless view model.glb --rate 900000 --temporal 0.8
+  frameless view fox.glb --animation Run
   frameless view sphere --sampler change --reconstruction hold
       the algorithm of 2002
   frameless view sphere --size 512x384 --screenshot shot.png --after 3")]
@@ -93,6 +96,9 @@ pub(crate) struct LookArgs {
     /// A glTF file or a built-in scene
     #[arg(default_value = DEFAULT_SCENE)]
     pub(crate) scene: String,
+
+    #[command(flatten)]
+    pub(crate) choice: ChoiceArgs,
 
     /// Who chooses the pixels [default: adaptive]
     ///
@@ -134,6 +140,9 @@ pub(crate) struct LookArgs {
     #[arg(allow_negative_numbers = true)]
     pub(crate) exposure: f32,
 
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
+
     /// Trace with so many threads; 0: one per core
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) threads: usize,
@@ -141,6 +150,19 @@ pub(crate) struct LookArgs {
     /// The seed of all random choices
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,
+}
+
+/// Which part of a glTF file.
+#[derive(ClapArgs, Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct ChoiceArgs {
+    /// Show this of the file's scenes: a number from 0, or a name [default: the one that the file names, else its first]
+    #[arg(long = "scene", value_name = "N|NAME")]
+    pub(crate) file_scene: Option<Pick>,
+
+    /// Play this of the file's animations: a number from 0, a name, all or none [default: all at once; the first alone if two
+    /// of them move the same thing]
+    #[arg(long, value_name = "N|NAME|all|none")]
+    pub(crate) animation: Option<AnimationChoice>,
 }
 
 /// The scene of `frameless` without arguments.
@@ -151,6 +173,7 @@ impl Default for ViewArgs {
     fn default() -> ViewArgs {
         let look = LookArgs {
             scene: DEFAULT_SCENE.into(),
+            choice: ChoiceArgs::default(),
             sampler: None,
             reconstruction: None,
             temporal: None,
@@ -158,6 +181,7 @@ impl Default for ViewArgs {
             rate: None,
             camera: 0,
             exposure: 0.0,
+            light: LightArgs::default(),
             threads: 0,
             seed: 1,
         };
@@ -208,6 +232,9 @@ pub(crate) struct RenderArgs {
     /// A glTF file or a built-in scene
     pub(crate) scene: String,
 
+    #[command(flatten)]
+    pub(crate) choice: ChoiceArgs,
+
     /// The moment, in seconds of the scene's own time
     #[arg(long, value_name = "SECS", default_value = "0", value_parser = parse::finite)]
     #[arg(allow_negative_numbers = true)]
@@ -229,6 +256,48 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "STOPS", default_value = "0", value_parser = parse::stops)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) exposure: f32,
+
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
+
+    /// Samples per pixel: one at its centre, or so many spread over it
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    pub(crate) samples: u32,
+}
+
+/// How light is followed.
+#[derive(ClapArgs)]
+pub(crate) struct LightArgs {
+    /// How light is followed
+    ///
+    /// direct: lights seen directly and in mirrors, with hard shadows; without noise. path: light that has bounced any number of
+    /// times, by random paths; noise goes away where the picture rests.
+    #[arg(long, value_name = "NAME", default_value = "direct", value_parser = integrator_names())]
+    pub(crate) integrator: String,
+
+    /// After how many surfaces a path of light ends
+    #[arg(long, value_name = "N", default_value_t = Settings::default().max_depth)]
+    #[arg(value_parser = clap::value_parser!(u32).range(0..=1000))]
+    pub(crate) max_depth: u32,
+}
+
+impl Default for LightArgs {
+    fn default() -> LightArgs {
+        let Settings { integrator, max_depth, .. } = Settings::default();
+        LightArgs { integrator: integrator.name().to_owned(), max_depth }
+    }
+}
+
+impl LightArgs {
+    pub(crate) fn settings(&self) -> Settings {
+        let integrator = Integrator::from_name(&self.integrator).unwrap_or_default();
+        Settings { integrator, max_depth: self.max_depth, ..Settings::default() }
+    }
+}
+
+fn integrator_names() -> clap::builder::PossibleValuesParser {
+    clap::builder::PossibleValuesParser::new(Integrator::ALL.map(Integrator::name))
 }
 
 /// Trace one pixel and tell every step: the ray, what it hit, each light, the colour
@@ -238,6 +307,9 @@ pub(crate) struct RenderArgs {
 pub(crate) struct TraceArgs {
     /// A glTF file or a built-in scene
     pub(crate) scene: String,
+
+    #[command(flatten)]
+    pub(crate) choice: ChoiceArgs,
 
     /// Column and row, counted from the top left
     #[arg(long, value_name = "X,Y", value_parser = parse::pixel)]
@@ -261,10 +333,14 @@ pub(crate) struct TraceArgs {
 #[derive(ClapArgs)]
 #[command(after_help = "Examples:
   frameless info sphere
-  frameless info model.glb")]
+  frameless info model.glb
+      the names of its scenes and animations are what --scene and --animation take")]
 pub(crate) struct InfoArgs {
     /// A glTF file or a built-in scene
     pub(crate) scene: String,
+
+    #[command(flatten)]
+    pub(crate) choice: ChoiceArgs,
 }
 
 fn sampler_names() -> clap::builder::PossibleValuesParser {
@@ -295,6 +371,7 @@ mod tests {
             (typed.scene, typed.sampler, typed.size, typed.rate, typed.camera),
             (default.scene, default.sampler, default.size, default.rate, default.camera)
         );
+        assert_eq!(typed.choice, default.choice);
         assert_eq!(
             (typed.reconstruction, typed.temporal),
             (default.reconstruction, default.temporal)
@@ -324,6 +401,10 @@ pub(crate) struct BenchArgs {
     #[arg(long)]
     scene: Option<String>,
 
+    /// Which of the file's animations are played, as for `view`
+    #[arg(long, value_name = "N|NAME|all|none")]
+    animation: Option<AnimationChoice>,
+
     /// Size of the picture in pixels
     #[arg(long, value_name = "WxH", default_value = "512x384", value_parser = parse::size)]
     pub(crate) size: Size,
@@ -349,6 +430,11 @@ impl BenchArgs {
     /// What is traced.
     pub(crate) fn scene(&self) -> &str {
         self.scene.as_deref().unwrap_or(DEFAULT_SCENE)
+    }
+
+    /// What of it moves.
+    pub(crate) fn choice(&self) -> ChoiceArgs {
+        ChoiceArgs { file_scene: None, animation: self.animation.clone() }
     }
 
     /// For benchmarks whose scenes are fixed.

@@ -1,7 +1,8 @@
 //! `frameless info`: what is in a scene.
 
 use frameless_scene::{
-    AfterEnd, Camera, Geometry, Image, Light, LightKind, Mesh, Projection, Scene, Target,
+    AfterEnd, Camera, Geometry, Image, Influences, Light, LightKind, Mesh, MorphTarget, Projection,
+    Scene, Target,
 };
 
 use crate::args::InfoArgs;
@@ -15,13 +16,16 @@ const MIB: f64 = 1_048_576.0;
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     // Warnings stand in the list below.
     logger::silence();
-    let scene = input::scene(&args.scene)?;
+    let scene = input::scene(&args.scene, &args.choice)?;
     Ok(output::print(&describe(&scene))?)
 }
 
 /// A paragraph of lines `what  how many`, lists indented below, warnings last.
 fn describe(scene: &Scene) -> String {
     let mut lines = vec![format!("scene       {}", scene.name)];
+    let contents = &scene.contents;
+    let shown: Vec<usize> = contents.shown_scene.into_iter().collect();
+    lines.extend(parts("scenes", &contents.scenes, "shown", &shown));
     lines.extend([shapes(scene), triangles(scene), bounds(scene)]);
     lines.push(format!("materials   {}", scene.materials.len()));
     lines.push(format!("textures    {}", textures(scene)));
@@ -31,6 +35,8 @@ fn describe(scene: &Scene) -> String {
     lines.push(format!("lights      {}", scene.lights.len()));
     lines.extend(scene.lights.iter().enumerate().map(|(i, lamp)| item(i, &light(lamp))));
     lines.push(format!("motion      {}", motion(scene)));
+    lines.extend(parts("animations", &contents.animations, "played", &contents.played));
+    lines.extend(deformations(scene));
     lines.extend(scene.notes.iter().map(|note| format!("note: {note}")));
     lines.extend(scene.warnings.iter().map(|warning| format!("warning: {warning}")));
     lines.iter().map(|line| output::printable(line) + "\n").collect()
@@ -38,6 +44,32 @@ fn describe(scene: &Scene) -> String {
 
 fn item(index: usize, text: &str) -> String {
     format!("{index:>12}  {text}")
+}
+
+/// What a file has several of, and which of them are used; nothing for built-in scenes.
+fn parts(what: &str, names: &[String], used: &str, which: &[usize]) -> Vec<String> {
+    if names.is_empty() {
+        return Vec::new();
+    }
+    let mut lines = vec![format!("{what:<12}{}", names.len())];
+    let line = |(index, name): (usize, &String)| {
+        let mark = if which.contains(&index) { format!(", {used}") } else { String::new() };
+        item(index, &format!("{name:?}{mark}"))
+    };
+    lines.extend(names.iter().enumerate().map(line));
+    lines
+}
+
+/// What bends and bulges, if anything does.
+fn deformations(scene: &Scene) -> Option<String> {
+    let skinned = scene.deformations.iter().filter(|d| d.skin.is_some()).count();
+    let joints: usize = scene.skins.iter().map(|skin| skin.joints.len()).sum();
+    let (deforming, weights) = (scene.deformations.len(), scene.morph_weights.len());
+    (deforming > 0).then(|| {
+        format!(
+            "deforming   {deforming} instances, {skinned} of them by skins ({joints} joints); {weights} morph weights"
+        )
+    })
 }
 
 fn shapes(scene: &Scene) -> String {
@@ -80,6 +112,18 @@ fn mesh_bytes(mesh: &Mesh) -> usize {
         + size_of_val(&mesh.colors[..])
         + size_of_val(&mesh.triangles[..])
         + size_of_val(&mesh.triangle_materials[..])
+        + mesh.influences.iter().map(influence_bytes).sum::<usize>()
+        + mesh.targets.iter().map(target_bytes).sum::<usize>()
+}
+
+fn influence_bytes(set: &Influences) -> usize {
+    size_of_val(&set.joints[..]) + size_of_val(&set.weights[..])
+}
+
+fn target_bytes(target: &MorphTarget) -> usize {
+    size_of_val(&target.positions[..])
+        + size_of_val(&target.normals[..])
+        + size_of_val(&target.colors[..])
 }
 
 fn bounds(scene: &Scene) -> String {
@@ -152,5 +196,6 @@ fn driven(target: Target) -> &'static str {
         Target::Rotation(_) => "rotation",
         Target::Scale(_) => "scale",
         Target::LightIntensity(_) => "light",
+        Target::MorphWeight(_) => "morph weight",
     }
 }

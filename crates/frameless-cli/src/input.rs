@@ -3,15 +3,16 @@
 use std::path::Path;
 
 use anyhow::anyhow;
-use frameless_scene::{BUILTIN_NAMES, Limits, Scene};
+use frameless_scene::{Animation, AnimationChoice, BUILTIN_NAMES, Choice, Limits, Scene};
 
+use crate::args::ChoiceArgs;
 use crate::failure::Failure;
 
-/// The built-in scene of that name, else the file. A file in the way of a built-in name is reached as
-/// `./sphere`.
-pub(crate) fn scene(name: &str) -> Result<Scene, Failure> {
+/// The built-in scene of that name, else the file, of which a part may be chosen. A file in the way of a built-in name is
+/// reached as `./sphere`.
+pub(crate) fn scene(name: &str, choice: &ChoiceArgs) -> Result<Scene, Failure> {
     if let Some(scene) = frameless_scene::builtin(name) {
-        return Ok(scene);
+        return whole(scene, choice);
     }
     let path = Path::new(name);
     if path.extension().is_none() && !path.exists() {
@@ -20,7 +21,27 @@ pub(crate) fn scene(name: &str) -> Result<Scene, Failure> {
             "{name}: no such file, and no built-in scene (those are: {names})"
         )));
     }
-    frameless_scene::load(path, &Limits::default()).map_err(Failure::bad_input)
+    let animation = choice.animation.clone().unwrap_or_default();
+    let choice = Choice { scene: choice.file_scene.clone(), animation };
+    frameless_scene::load_chosen(path, &choice, &Limits::default()).map_err(Failure::bad_input)
+}
+
+/// A built-in scene has no parts; it may be held still.
+fn whole(mut scene: Scene, choice: &ChoiceArgs) -> Result<Scene, Failure> {
+    match (&choice.file_scene, &choice.animation) {
+        (None, None | Some(AnimationChoice::All)) => {}
+        (None, Some(AnimationChoice::None)) => scene.animation = Animation::default(),
+        (scene_asked, _) => {
+            let flag = if scene_asked.is_some() { "--scene" } else { "--animation" };
+            let name = &scene.name;
+            let error = anyhow!(
+                "{flag}: the built-in scene {name} has no parts to choose from; a glTF file has \
+                 (frameless info FILE lists them)"
+            );
+            return Err(Failure::bad_input(error));
+        }
+    }
+    Ok(scene)
 }
 
 /// The camera's number, if the scene has it.

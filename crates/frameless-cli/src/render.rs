@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use anyhow::Context;
 use frameless::Display;
-use frameless_trace::{Settings, ViewSource, World};
-use indicatif::ProgressBar;
+use frameless_trace::{Still, ViewSource, World};
+use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::args::RenderArgs;
 use crate::failure::Failure;
@@ -15,7 +15,7 @@ use crate::{input, output};
 /// Trace every pixel's centre and write the picture.
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     output::check_png_path(&args.out)?;
-    let scene = input::scene(&args.scene)?;
+    let scene = input::scene(&args.scene, &args.choice)?;
     let view = ViewSource::Camera(input::camera(&scene, args.camera)?);
 
     let waiting = waiting();
@@ -23,14 +23,23 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let world = World::new(Arc::new(scene));
     waiting.set_message(format!("tracing {}×{} pixels", args.size.width, args.size.height));
     let pool = rayon::ThreadPoolBuilder::new().build().context("cannot start threads")?;
-    let radiance =
-        frameless_trace::render(&world, args.time, &view, args.size, &Settings::default(), &pool);
+    let (secs, size, samples) = (args.time, args.size, args.samples);
+    let still = Still { secs, view, size, settings: args.light.settings(), samples };
+    waiting.set_length(u64::from(size.height));
+    waiting.set_style(bar());
+    let radiance = frameless_trace::render_still(&world, &still, &pool, || waiting.inc(1));
     waiting.set_message("writing");
     let display = Display::new(args.exposure);
     let rgba = radiance.into_iter().map(|rgb| display.encode_rgba8(rgb)).collect();
     output::write_png(&args.out, args.size.width, args.size.height, rgba)?;
     waiting.finish_and_clear();
     Ok(())
+}
+
+/// How much of the picture is there.
+fn bar() -> ProgressStyle {
+    let style = ProgressStyle::with_template("{spinner} {msg} {bar:30} {percent:>3} %, {eta} left");
+    style.unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
 /// What is being done and for how long, on a terminal; nothing elsewhere.

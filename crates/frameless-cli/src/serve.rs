@@ -7,7 +7,7 @@ use anyhow::anyhow;
 use frameless::Clock;
 use frameless_scene::{Limits, Scene};
 use frameless_session::{Helm, PictureSize, Session};
-use frameless_trace::{CpuTracer, Settings, ViewSource, World};
+use frameless_trace::{CpuTracer, ViewSource, World};
 use frameless_web::{MOST_PIXELS, Options, Scenes, Server, Show, TlsFiles};
 
 use crate::args::{LookArgs, ServeArgs};
@@ -66,7 +66,7 @@ fn show(look: &LookArgs) -> Result<Show<CpuTracer>, Failure> {
     let scene = Arc::new(view::scene(look)?);
     let prepare = |scene: &Arc<Scene>| Arc::new(World::new(Arc::clone(scene)));
     let camera = ViewSource::Camera(0);
-    let tracer = CpuTracer::new(prepare(&scene), camera, Settings::default(), look.threads);
+    let tracer = CpuTracer::new(prepare(&scene), camera, look.light.settings(), look.threads);
     let size = settings.picture.size_in(FIRST_PLACE);
     Ok(Show {
         session: Session::new(size, Clock::real(), settings, look.seed, tracer),

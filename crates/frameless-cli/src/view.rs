@@ -24,6 +24,7 @@ pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
     let settings = settings(&args.look)?;
     let mut options = ViewOptions::new(Arc::new(scene(&args.look)?));
     options.settings = settings;
+    options.tracing = args.look.light.settings();
     options.threads = args.look.threads;
     options.seed = args.look.seed;
     let Some(screenshot) = &args.screenshot else {
@@ -48,7 +49,7 @@ pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
 
 /// The scene that is looked at, with the camera that is wanted as its first.
 pub(crate) fn scene(args: &LookArgs) -> Result<Scene, Failure> {
-    let mut scene = input::scene(&args.scene)?;
+    let mut scene = input::scene(&args.scene, &args.choice)?;
     let first = input::camera(&scene, args.camera)?;
     scene.cameras.rotate_left(first as usize);
     Ok(scene)

@@ -91,8 +91,9 @@ impl Subject {
     /// Whether nothing that can be seen differs between two times: neither camera nor object nor light.
     pub fn is_still(&self, a_secs: f64, b_secs: f64) -> bool {
         let (a, b) = (self.state(a_secs), self.state(b_secs));
-        let same_state =
-            a.world_from_node == b.world_from_node && a.light_intensity == b.light_intensity;
+        let same_state = a.world_from_node == b.world_from_node
+            && a.light_intensity == b.light_intensity
+            && a.morph_weights == b.morph_weights;
         same_state && self.view(&a, a_secs) == self.view(&b, b_secs)
     }
 

@@ -49,6 +49,8 @@ pub enum Target {
     Scale(u32),
     /// A light's intensity, by index into the scene's lights.
     LightIntensity(u32),
+    /// How much of a morph target is added, by index into the scene's morph weights.
+    MorphWeight(u32),
 }
 
 /// Values at the keys.
@@ -58,6 +60,8 @@ pub enum Values {
     Vec3(Vec<Vec3>),
     /// Rotation; unit length.
     Quat(Vec<Quat>),
+    /// Morph weight.
+    Scalar(Vec<f32>),
 }
 
 /// How values between keys come about.
@@ -93,6 +97,8 @@ pub enum Value {
     Vec3(Vec3),
     /// Rotation; unit length.
     Quat(Quat),
+    /// Morph weight.
+    Scalar(f32),
 }
 
 impl Channel {
@@ -100,11 +106,8 @@ impl Channel {
     pub fn value_at(&self, local_secs: f32) -> Value {
         let place = Place::find(&self.times, local_secs);
         match &self.values {
-            Values::Vec3(values) => Value::Vec3(match self.interpolation {
-                Interpolation::Step => values[place.key],
-                Interpolation::Linear => place.linear(values, |a, b, u| a + (b - a) * u),
-                Interpolation::CubicSpline => place.spline(values),
-            }),
+            Values::Vec3(values) => Value::Vec3(self.blend(&place, values)),
+            Values::Scalar(values) => Value::Scalar(self.blend(&place, values)),
             Values::Quat(values) => Value::Quat(match self.interpolation {
                 Interpolation::Step => values[place.key],
                 Interpolation::Linear => place.linear(values, great_arc),
@@ -112,6 +115,20 @@ impl Channel {
                     unit_or(place.spline(values), values[3 * place.key + 1])
                 }
             }),
+        }
+    }
+}
+
+impl Channel {
+    /// Values that add up and need no particular length.
+    fn blend<V>(&self, place: &Place, values: &[V]) -> V
+    where
+        V: Copy + Add<Output = V> + Sub<Output = V> + Mul<f32, Output = V>,
+    {
+        match self.interpolation {
+            Interpolation::Step => values[place.key],
+            Interpolation::Linear => place.linear(values, |a, b, u| a + (b - a) * u),
+            Interpolation::CubicSpline => place.spline(values),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::{Affine3A, Vec3};
 
-use crate::{Geometry, Scene, State};
+use crate::{Deformation, Deformed, Geometry, Scene, State};
 
 /// An axis-aligned box, in metres. Both corners belong to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,9 +63,19 @@ impl Scene {
     /// large where things are turned. `None` if there is nothing to be seen.
     pub fn bounds_at(&self, state: &State) -> Option<Bounds> {
         let local: Vec<_> = self.geometries.iter().map(Geometry::bounds).collect();
-        let boxes = self.instances.iter().filter_map(|instance| {
-            let world_from_node = &state.world_from_node[instance.node as usize];
-            local[instance.geometry as usize].map(|bounds| bounds.transformed(world_from_node))
+        let mut deformations = self.deformations.iter().enumerate().peekable();
+        let mut deformed = Deformed::default();
+        let boxes = self.instances.iter().enumerate().filter_map(|(index, instance)| {
+            let deforms = |&(_, d): &(usize, &Deformation)| d.instance as usize == index;
+            let local = match deformations.next_if(deforms) {
+                Some((number, _)) => {
+                    self.deform(number, state, &mut deformed);
+                    let points = deformed.positions().iter().map(|&point| Vec3::from(point));
+                    Bounds::of_points(points.filter(|point| point.is_finite()))
+                }
+                None => local[instance.geometry as usize],
+            };
+            local.map(|bounds| bounds.transformed(&self.world_from_instance(index, state)))
         });
         boxes.reduce(Bounds::union)
     }

@@ -1,8 +1,13 @@
 //! What every scene promises, said as code: for tests, and for scenes put together by hand.
 
+use std::ops::Range;
+
 use glam::Vec3;
 
-use crate::{Channel, Geometry, Interpolation, Mesh, Projection, Scene, Target, Values};
+use crate::{
+    Channel, Deformation, Geometry, Influences, Interpolation, Mesh, Projection, Scene, Target,
+    Values,
+};
 
 /// How far from 1 the length of a unit vector or quaternion may be: a few roundings.
 const UNIT_TOLERANCE: f32 = 1e-3;
@@ -16,6 +21,7 @@ impl Scene {
         for (i, geometry) in self.geometries.iter().enumerate() {
             self.check_geometry(geometry).map_err(|why| format!("geometry {i}: {why}"))?;
         }
+        self.check_deformations()?;
         self.check_cameras_and_lights()?;
         wanted(
             self.animation.duration_secs.is_finite() && self.animation.duration_secs >= 0.0,
@@ -78,6 +84,38 @@ impl Scene {
         }
     }
 
+    fn check_deformations(&self) -> Result<(), String> {
+        wanted(self.morph_weights.iter().all(|w| w.is_finite()), "finite morph weights")?;
+        for (i, skin) in self.skins.iter().enumerate() {
+            let found = skin.joints.iter().all(|&joint| within(joint, &self.nodes));
+            let bound = skin.inverse_bind.len() == skin.joints.len()
+                && skin.inverse_bind.iter().all(|matrix| matrix.is_finite());
+            wanted(found && bound, &format!("skin {i}: nodes, each with a finite matrix"))?;
+        }
+        let ascending = self.deformations.windows(2).all(|two| two[0].instance < two[1].instance);
+        wanted(ascending, "deformations in the order of their instances")?;
+        for (i, deformation) in self.deformations.iter().enumerate() {
+            self.check_deformation(deformation).map_err(|why| format!("deformation {i}: {why}"))?;
+        }
+        Ok(())
+    }
+
+    fn check_deformation(&self, deformation: &Deformation) -> Result<(), String> {
+        wanted(within(deformation.instance, &self.instances), "an instance")?;
+        let instance = self.instances[deformation.instance as usize];
+        let Geometry::Mesh(mesh) = &self.geometries[instance.geometry as usize] else {
+            return Err("wanted a mesh, as nothing else deforms".to_owned());
+        };
+        let Range { start, end } = deformation.weights;
+        let known = start <= end && end as usize <= self.morph_weights.len();
+        wanted(known && (end - start) as usize == mesh.targets.len(), "a weight per target")?;
+        let Some(skin) = deformation.skin else { return Ok(()) };
+        wanted(within(skin, &self.skins) && !mesh.influences.is_empty(), "a skin and its joints")?;
+        let joints = &self.skins[skin as usize].joints;
+        let mut used = mesh.influences.iter().flat_map(|set| set.joints.as_flattened());
+        wanted(used.all(|&joint| usize::from(joint) < joints.len()), "joints that the skin has")
+    }
+
     fn check_cameras_and_lights(&self) -> Result<(), String> {
         wanted(!self.cameras.is_empty(), "a camera")?;
         for (i, camera) in self.cameras.iter().enumerate() {
@@ -110,6 +148,7 @@ impl Scene {
             Target::Translation(i) | Target::Scale(i) => (within(i, &self.nodes), false),
             Target::Rotation(i) => (within(i, &self.nodes), true),
             Target::LightIntensity(i) => (within(i, &self.lights), false),
+            Target::MorphWeight(i) => (within(i, &self.morph_weights), false),
         };
         wanted(found, "a target")?;
         let times = &channel.times;
@@ -121,16 +160,43 @@ impl Scene {
         let (count, finite) = match &channel.values {
             Values::Vec3(values) => (values.len(), values.iter().all(|v| v.is_finite())),
             Values::Quat(values) => (values.len(), values.iter().all(|q| q.is_finite())),
+            Values::Scalar(values) => (values.len(), values.iter().all(|w| w.is_finite())),
         };
         wanted(count == times.len() * values_per_key && finite, "a finite value for each key")?;
-        wanted(
-            rotation == matches!(channel.values, Values::Quat(_)),
-            "values of the target's kind",
-        )?;
+        let scalar = matches!(channel.target, Target::MorphWeight(_));
+        let matching = match channel.values {
+            Values::Vec3(_) => !rotation && !scalar,
+            Values::Quat(_) => rotation,
+            Values::Scalar(_) => scalar,
+        };
+        wanted(matching, "values of the target's kind")?;
         let Values::Quat(values) = &channel.values else { return Ok(()) };
         let keys = values.iter().skip(usize::from(spline)).step_by(values_per_key);
         wanted(keys.into_iter().all(|q| is_unit(q.length())), "unit quaternions")
     }
+}
+
+fn check_targets(mesh: &Mesh) -> Result<(), String> {
+    let vertices = mesh.positions.len();
+    let fits = |len: usize| len == 0 || len == vertices;
+    for target in &mesh.targets {
+        let lengths = fits(target.positions.len())
+            && (target.normals.is_empty() || target.normals.len() == mesh.normals.len())
+            && (target.colors.is_empty() || target.colors.len() == mesh.colors.len());
+        wanted(lengths, "morph targets as long as what they are added to")?;
+        let finite = target.positions.iter().chain(&target.normals).all(|v| v.is_finite())
+            && target.colors.iter().all(|c| c.is_finite());
+        wanted(finite, "finite morph targets")?;
+    }
+    let long = |set: &Influences| set.joints.len() == vertices && set.weights.len() == vertices;
+    wanted(mesh.influences.iter().all(long), "as many joints and weights as positions")?;
+    let sums_to_one = |vertex: usize| {
+        let weights = mesh.influences.iter().flat_map(|set| set.weights[vertex]);
+        let sum: f32 = weights.clone().sum();
+        weights.into_iter().all(|w| w >= 0.0) && (sum - 1.0).abs() <= UNIT_TOLERANCE
+    };
+    let sums = mesh.influences.is_empty() || (0..vertices).all(sums_to_one);
+    wanted(sums, "joint weights that sum to 1")
 }
 
 fn check_mesh(mesh: &Mesh, materials: usize) -> Result<(), String> {
@@ -144,6 +210,7 @@ fn check_mesh(mesh: &Mesh, materials: usize) -> Result<(), String> {
     wanted(lengths.iter().all(|&n| n == 0 || n == vertices), "as many attributes as positions")?;
     let in_bounds = mesh.triangles.iter().flatten().all(|&v| (v as usize) < vertices);
     wanted(in_bounds, "triangles of existing vertices")?;
+    check_targets(mesh)?;
     let known = mesh.triangle_materials.iter().all(|&m| (m as usize) < materials);
     wanted(
         known && mesh.triangle_materials.len() == mesh.triangles.len(),

@@ -3,6 +3,8 @@
 //! A [`Scene`] comes from a glTF file or from the built-in suite; once it exists every index is in bounds, every number
 //! finite, every node after its parent. What moves is told by [`Animation`]; [`Scene::state_at`] evaluates it.
 
+use std::ops::Range;
+
 use glam::{Affine3A, Quat, Vec2, Vec3, Vec4};
 
 use crate::animation::Animation;
@@ -24,6 +26,12 @@ pub struct Scene {
     pub nodes: Vec<Node>,
     /// Which geometry stands at which node. An instance's index is the object number of its samples.
     pub instances: Vec<Instance>,
+    /// Bones that bend meshes.
+    pub skins: Vec<Skin>,
+    /// Which instances deform, and by what; in the order of the instances, each at most once.
+    pub deformations: Vec<Deformation>,
+    /// How much of each morph target is added while nothing moves it; see [`Deformation::weights`]. Finite.
+    pub morph_weights: Vec<f32>,
     /// Views that the file offers; never empty after loading.
     pub cameras: Vec<Camera>,
     /// Light sources; may be empty only if `ambient` is not black.
@@ -39,10 +47,29 @@ pub struct Scene {
     pub warnings: Vec<String>,
     /// What was added because the file had none ("no camera: framed the scene"), for the HUD and the log.
     pub notes: Vec<String>,
+    /// What else the file offers.
+    pub contents: Contents,
+}
+
+/// The scenes and animations of the file, for whoever wants to choose others. Empty for built-in scenes.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Contents {
+    /// Names of the file's scenes; may be empty.
+    pub scenes: Vec<String>,
+    /// Index of the scene that is shown, if the file has any.
+    pub shown_scene: Option<usize>,
+    /// Names of the file's animations; may be empty.
+    pub animations: Vec<String>,
+    /// Indices of the animations that are played.
+    pub played: Vec<usize>,
 }
 
 /// A shape.
 #[derive(Clone, Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "nearly all are meshes, and a box would be one more look at memory per sample"
+)]
 pub enum Geometry {
     /// Triangles.
     Mesh(Mesh),
@@ -69,6 +96,30 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// Index into [`Scene::materials`], per triangle.
     pub triangle_materials: Vec<u32>,
+    /// Shapes that weights blend in, see [`Deformation::weights`].
+    pub targets: Vec<MorphTarget>,
+    /// Which joints move each vertex, four per set; empty: the mesh cannot be skinned.
+    pub influences: Vec<Influences>,
+}
+
+/// What a morph weight of 1 adds to the mesh. Arrays are as long as [`Mesh::positions`], or empty. Finite.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MorphTarget {
+    /// Added to the positions.
+    pub positions: Vec<Vec3>,
+    /// Added to the normals; empty if the mesh has none.
+    pub normals: Vec<Vec3>,
+    /// Added to the colours; empty if the mesh has none.
+    pub colors: Vec<Vec4>,
+}
+
+/// Four joints per vertex and how much each of them counts. Both arrays are as long as [`Mesh::positions`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Influences {
+    /// Indices into [`Skin::joints`] of every skin that the mesh is used with.
+    pub joints: Vec<[u16; 4]>,
+    /// At least 0; over all sets of a mesh, a vertex's sum to 1.
+    pub weights: Vec<[f32; 4]>,
 }
 
 /// A metallic-roughness surface (glTF 2.0 §3.9).
@@ -84,6 +135,9 @@ pub struct Material {
     pub metallic: f32,
     /// 0: mirror, 1: matte.
     pub roughness: f32,
+    /// How strongly a dielectric reflects, from 0 (not at all) to 1 (as glass does); the factor of KHR_materials_specular. Metals do
+    /// not know it.
+    pub specular: f32,
     /// Linear RGB radiance given off.
     pub emissive: Vec3,
     /// Whether back faces are seen.
@@ -100,6 +154,7 @@ impl Default for Material {
             base_color_texture: None,
             metallic: 0.0,
             roughness: 1.0,
+            specular: 1.0,
             emissive: Vec3::ZERO,
             double_sided: false,
         }
@@ -199,6 +254,28 @@ pub struct Instance {
     pub node: u32,
     /// Index into [`Scene::geometries`].
     pub geometry: u32,
+}
+
+/// Joints that carry the vertices of meshes (glTF 2.0 §3.7.3).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Skin {
+    /// As in the file; may be empty.
+    pub name: String,
+    /// Indices into [`Scene::nodes`].
+    pub joints: Vec<u32>,
+    /// Joint from mesh, while the mesh is as it was modelled; as many as `joints`. Finite.
+    pub inverse_bind: Vec<Affine3A>,
+}
+
+/// How an instance of a mesh deforms: morph targets first, then the skin.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Deformation {
+    /// Index into [`Scene::instances`]; its geometry is a mesh.
+    pub instance: u32,
+    /// Index into [`Scene::skins`]. The vertices of a skinned mesh go straight to the world: its node's transform is not used.
+    pub skin: Option<u32>,
+    /// Where in [`Scene::morph_weights`] the weights of the mesh's targets stand, one per target.
+    pub weights: Range<u32>,
 }
 
 /// A camera at a node, looking along −z with +y up.

@@ -15,6 +15,8 @@ pub struct State {
     pub world_from_node: Vec<Affine3A>,
     /// Linear RGB, per light; see [`crate::Light::intensity`].
     pub light_intensity: Vec<Vec3>,
+    /// How much of each morph target is added; see [`crate::Scene::morph_weights`].
+    pub morph_weights: Vec<f32>,
 }
 
 impl Scene {
@@ -32,6 +34,7 @@ impl Scene {
         state.parent_from_node.extend(self.nodes.iter().map(|node| node.rest));
         state.light_intensity.clear();
         state.light_intensity.extend(self.lights.iter().map(|light| light.intensity));
+        state.morph_weights.clone_from(&self.morph_weights);
         self.apply_animation(secs, state);
         self.compose_world(state);
     }
@@ -50,6 +53,7 @@ impl Scene {
                 (Target::LightIntensity(i), Value::Vec3(v)) => {
                     state.light_intensity[i as usize] = v;
                 }
+                (Target::MorphWeight(i), Value::Scalar(w)) => state.morph_weights[i as usize] = w,
                 (target, value) => unreachable!("{target:?} cannot be {value:?}: see Scene::check"),
             }
         }

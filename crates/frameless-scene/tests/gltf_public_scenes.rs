@@ -31,6 +31,8 @@ fn expected_triangles(asset: &Value) -> usize {
     let counted = asset["triangles"].as_u64().unwrap() as usize;
     match file {
         "accessors/MeshPrimitiveModes/MeshPrimitiveModes.gltf" => counted + 4 + 6,
+        // EXT_mesh_gpu_instancing.
+        "scene/SimpleInstancing.glb" => counted * 125,
         "scene/MultipleScenes/MultipleScenes.gltf" => counted - 1,
         _ => counted,
     }
@@ -45,14 +47,20 @@ fn complaints(scene: &Scene, asset: &Value) -> Vec<String> {
     };
     expect("triangles", triangles(scene) as f64, expected_triangles(asset) as f64);
     let merges_nothing = asset["animations"].as_u64().unwrap() <= 1;
-    if merges_nothing && asset["morph_targets"] == 0 {
+    if merges_nothing {
         expect("seconds", scene.animation.duration_secs, asset["duration_s"].as_f64().unwrap());
     }
     let cameras = asset["cameras"].as_u64().unwrap().max(1) as f64;
     expect("cameras", scene.cameras.len() as f64, cameras);
     let has = |what: &str| scene.warnings.iter().any(|warning| warning.contains(what));
-    expect("skin warned of", f64::from(has("skin")), f64::from(asset["skins"] != 0));
-    expect("morph warned of", f64::from(has("morph")), f64::from(asset["morph_targets"] != 0));
+    let (skins, targets) = (&asset["skins"], &asset["morph_targets"]);
+    expect("skins", scene.skins.len() as f64, skins.as_f64().unwrap());
+    expect(
+        "deforms",
+        f64::from(!scene.deformations.is_empty()),
+        f64::from(*skins != 0 || *targets != 0),
+    );
+    expect("warned of deformation", f64::from(has("skin") || has("morph")), 0.0);
     let modes = asset["alpha_modes"].as_array().unwrap();
     let transparent = modes.iter().any(|mode| *mode != "OPAQUE");
     expect("alpha warned of", f64::from(has("alpha mode")), f64::from(transparent));

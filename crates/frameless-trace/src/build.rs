@@ -15,7 +15,7 @@ use crate::traverse::STACK_PER_TREE;
 use crate::wide::{Child, Node, collapse};
 
 /// A mesh's bottom-level BVH: triangles copied into packs of four, in the order of the leaves.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Blas {
     pub(crate) nodes: Vec<Node>,
     pub(crate) packs: Vec<Pack>,
@@ -27,25 +27,40 @@ impl Blas {
     /// Triangles with a vertex that is not finite, or so far away that squares overflow, are left out: the builder
     /// panics on NaN. Triangles without area stay; no ray hits them.
     pub(crate) fn new(mesh: &Mesh) -> Blas {
+        let corners = |primitive| corners(mesh, primitive);
         let (primitives, boxes): (Vec<u32>, Vec<Aabb>) = (0..mesh.triangles.len() as u32)
-            .filter_map(|primitive| Some((primitive, sane_box(&corners(mesh, primitive))?)))
+            .filter_map(|primitive| Some((primitive, sane_box(&corners(primitive))?)))
             .unzip();
-        let mut binary = binary_by_clustering(&boxes);
-        let mut blas = Blas { nodes: Vec::new(), packs: Vec::new(), bounds: union(&boxes) };
-        let needed = blas.take(&binary, mesh, &primitives);
+        Blas::over(&primitives, &boxes, corners)
+    }
+
+    /// Of these triangles, whose boxes are known; `corners` tells where each is.
+    pub(crate) fn over(
+        primitives: &[u32],
+        boxes: &[Aabb],
+        corners: impl Fn(u32) -> [Vec3; 3],
+    ) -> Blas {
+        let mut binary = binary_by_clustering(boxes);
+        let mut blas = Blas { nodes: Vec::new(), packs: Vec::new(), bounds: union(boxes) };
+        let needed = blas.take(&binary, primitives, &corners);
         if needed > STACK_PER_TREE {
-            binary = binary_by_median(&boxes);
-            blas.take(&binary, mesh, &primitives);
+            binary = binary_by_median(boxes);
+            blas.take(&binary, primitives, &corners);
         }
         blas
     }
 
-    fn take(&mut self, binary: &Bvh2, mesh: &Mesh, primitives: &[u32]) -> usize {
+    fn take(
+        &mut self,
+        binary: &Bvh2,
+        primitives: &[u32],
+        corners: &impl Fn(u32) -> [Vec3; 3],
+    ) -> usize {
         self.packs.clear();
         let packs = &mut self.packs;
         collapse(binary, &mut self.nodes, |members| {
             let first = packs.len();
-            packs.extend(members.chunks(4).map(|four| pack(mesh, primitives, four)));
+            packs.extend(members.chunks(4).map(|four| pack(primitives, four, corners)));
             Child::leaf(first, packs.len() - first)
         })
     }
@@ -56,9 +71,10 @@ pub(crate) fn corners(mesh: &Mesh, primitive: u32) -> [Vec3; 3] {
     mesh.triangles[primitive as usize].map(|vertex| mesh.positions[vertex as usize])
 }
 
+/// Products of two coordinates, and of three in the builder's areas, must stay below 3.4e38.
+pub(crate) const FARTHEST: f32 = 1e15;
+
 fn sane_box(corners: &[Vec3; 3]) -> Option<Aabb> {
-    // Products of two coordinates, and of three in the builder's areas, must stay below 3.4e38.
-    const FARTHEST: f32 = 1e15;
     let sane = corners.iter().all(|c| c.is_finite() && c.abs().max_element() < FARTHEST);
     sane.then(|| Aabb::from_points(&corners.map(Vec3A::from)))
 }
@@ -67,12 +83,12 @@ fn union(boxes: &[Aabb]) -> Option<(Vec3A, Vec3A)> {
     boxes.iter().map(|b| (b.min, b.max)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
-fn pack(mesh: &Mesh, primitives: &[u32], members: &[u32]) -> Pack {
+fn pack(primitives: &[u32], members: &[u32], corners: &impl Fn(u32) -> [Vec3; 3]) -> Pack {
     let mut pack = Pack { vertex: [[[0.0; 4]; 3]; 3], primitive: [0; 4] };
     for lane in 0..4 {
         let primitive = primitives[members[lane.min(members.len() - 1)] as usize];
         pack.primitive[lane] = primitive;
-        for (corner, position) in corners(mesh, primitive).iter().enumerate() {
+        for (corner, position) in corners(primitive).iter().enumerate() {
             for axis in 0..3 {
                 pack.vertex[corner][axis][lane] = position[axis];
             }

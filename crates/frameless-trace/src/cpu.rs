@@ -9,7 +9,7 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use crate::camera::{Camera, ViewSource};
-use crate::direct::{NoProbe, Settings};
+use crate::integrator::Settings;
 use crate::moment::Moment;
 use crate::order::by_tile;
 use crate::traverse::Stack;
@@ -119,6 +119,10 @@ impl Tracer for CpuTracer {
         Some(answer)
     }
 
+    fn is_noisy(&self) -> bool {
+        self.settings.integrator.is_noisy()
+    }
+
     fn pose(&mut self, scene_secs: f64, size: Size, pose: &mut Pose) -> bool {
         let mut workspace = self.shared.take_workspace(scene_secs);
         self.shared.world.update_moment(scene_secs, &mut workspace.moment);
@@ -166,8 +170,8 @@ impl Shared {
         let chunks = order.par_chunks(CHUNK).zip(samples.par_chunks_mut(CHUNK));
         chunks.for_each_init(Stack::new, |stack, (order, samples)| {
             for (&request, sample) in order.iter().zip(samples) {
-                let ray = camera.ray(&requests[request as usize]);
-                *sample = self.world.radiance(moment, ray, settings, stack, &mut NoProbe);
+                let request = &requests[request as usize];
+                *sample = self.world.sample(moment, camera, request, settings, stack);
             }
         });
     }

@@ -6,32 +6,19 @@
 //! of every surface are drawn, the normal turned towards the viewer: a back face that is culled would let light through
 //! walls. Until there is a full BRDF, rough metals are matte in their base colour instead of black.
 
-use frameless::{Request, Size, Surface};
-use frameless_scene::{Material, View};
+use std::f32::consts::FRAC_1_PI;
+
+use frameless::Surface;
+use frameless_scene::Material;
 use glam::{Vec3, Vec3A};
 
-use crate::camera::Camera;
-use crate::images::{self, MirrorSide};
+use crate::first::FirstSurface;
+use crate::integrator::Settings;
 use crate::moment::Moment;
 use crate::point::Point;
 use crate::ray::Ray;
 use crate::traverse::Stack;
 use crate::world::World;
-
-/// How samples are traced.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Settings {
-    /// How many mirrors a ray may meet, one after the other; the last surface is matte. Default 4.
-    pub max_depth: u32,
-    /// Whether answers carry a [`Surface`] per sample; their `lit` then also tells of lights that are off. Default true.
-    pub surfaces: bool,
-}
-
-impl Default for Settings {
-    fn default() -> Settings {
-        Settings { max_depth: 4, surfaces: true }
-    }
-}
 
 /// Is told what happens to a ray; see [`crate::explain`].
 pub(crate) trait Probe {
@@ -47,19 +34,6 @@ impl Probe for NoProbe {
 }
 
 impl World {
-    /// One sample: its linear RGB radiance, finite and at least 0, and the surface that the ray hit first.
-    pub fn trace(
-        &self,
-        moment: &Moment,
-        view: &View,
-        size: Size,
-        request: &Request,
-        settings: &Settings,
-    ) -> ([f32; 3], Surface) {
-        let ray = Camera::new(view, size).ray(request);
-        self.radiance(moment, ray, settings, &mut Stack::new(), &mut NoProbe)
-    }
-
     /// What comes back along a ray.
     pub(crate) fn radiance(
         &self,
@@ -71,9 +45,7 @@ impl World {
     ) -> ([f32; 3], Surface) {
         let mut radiance = Vec3A::ZERO;
         let mut throughput = Vec3A::ONE;
-        let mut first = None;
-        // The mirror in which the next surface is the first that is seen.
-        let mut mirror_side = None;
+        let mut first = FirstSurface::default();
         for depth in 0..=settings.max_depth {
             probe
                 .note(|| format!("ray {depth}: from {:.5} along {:.5}", ray.origin, ray.direction));
@@ -86,8 +58,7 @@ impl World {
                     )
                 });
                 radiance += gives;
-                let seen = || sky_surface(&ray);
-                self.see(&mut first, seen, mirror_side.take(), throughput);
+                first.see(self, || sky_surface(&ray), throughput);
                 break;
             };
             probe.note(|| format!("  {hit:?}"));
@@ -105,21 +76,9 @@ impl World {
                 format!("  albedo {albedo:.5}, throughput {throughput:.5}: adds {gives:.6}")
             });
             radiance += gives;
-            let seen = || Surface {
-                object: hit.instance,
-                primitive: hit.primitive,
-                position: point.local_position.to_array(),
-                normal: point.local_normal.to_array(),
-                albedo: albedo.to_array(),
-                direct: (albedo * irradiance).to_array(),
-                lit,
-            };
-            self.see(&mut first, seen, mirror_side.take(), throughput);
+            first.see(self, || point.surface(&hit, albedo, irradiance, lit), throughput);
             if depth == 0 && settings.surfaces {
-                let geometry = self.scene().instances[hit.instance as usize].geometry;
-                let placed = moment.placed(hit.instance);
-                mirror_side =
-                    self.mirrors.seen(geometry, hit.instance, hit.primitive, placed, ray.direction);
+                first.look_into_mirror(self, moment, &hit, ray.direction);
             }
             throughput *= mirror * point.base;
             if throughput == Vec3A::ZERO {
@@ -127,28 +86,10 @@ impl World {
             }
             ray = Ray { origin: point.outside, direction: reflect(ray.direction, &point) };
         }
-        (finite(radiance), first.unwrap_or_else(|| sky_surface(&ray)))
+        (finite(radiance), first.surface(&ray))
     }
 
-    /// Keeps the surface that a sample belongs to: the first that is hit, or the image of the second in a plane mirror.
-    #[inline(always)]
-    fn see(
-        &self,
-        first: &mut Option<Surface>,
-        seen: impl FnOnce() -> Surface,
-        mirror_side: Option<MirrorSide>,
-        throughput: Vec3A,
-    ) {
-        if let Some(side) = mirror_side {
-            let surface = seen();
-            let object = self.mirrors.image_of(surface.object, side);
-            *first = Some(images::image(surface, object, throughput));
-        } else {
-            first.get_or_insert_with(seen);
-        }
-    }
-
-    /// Σ E cosθ V / π over the lights, and which of them reach the point (see [`Surface::lit`]; the first 32).
+    /// Σ E cosθ V / π over the lights, and which of them reach the point.
     fn direct_light(
         &self,
         moment: &Moment,
@@ -157,8 +98,23 @@ impl World {
         stack: &mut Stack,
         probe: &mut impl Probe,
     ) -> (Vec3A, u32) {
-        use std::f32::consts::FRAC_1_PI;
         let mut sum = Vec3A::ZERO;
+        let take = |arriving: Arriving| sum += arriving.per_albedo();
+        let lit = self.ask_lights(moment, point, settings, stack, probe, take);
+        (sum, lit)
+    }
+
+    /// Hands what reaches the point to `take`, and says of which lights (see [`Surface::lit`]; the first 32).
+    #[inline(always)]
+    pub(crate) fn ask_lights(
+        &self,
+        moment: &Moment,
+        point: &Point,
+        settings: &Settings,
+        stack: &mut Stack,
+        probe: &mut impl Probe,
+        mut take: impl FnMut(Arriving),
+    ) -> u32 {
         let mut lit = u32::MAX;
         for (index, light) in moment.lights.iter().enumerate() {
             let arriving = light.at(point.position.to_array());
@@ -176,29 +132,49 @@ impl World {
             };
             let shadow_ray = Ray { origin: point.shadow_origin, direction };
             let is_shadowed = moment.targets(self).occluded(&shadow_ray, t_max, stack);
-            let contribution = irradiance * (cos * FRAC_1_PI);
+            let arriving = Arriving { to_light, irradiance, cos };
             probe.note(|| {
                 let state = if is_shadowed { "in shadow, would give" } else { "visible, gives" };
+                let contribution = arriving.per_albedo();
                 format!("  light {index}: {state} {contribution:.5} per albedo (cos {cos:.4})")
             });
             if !is_shadowed {
-                sum += contribution;
+                take(arriving);
             } else if index < 32 {
                 lit &= !(1 << index);
             }
         }
-        (sum, lit)
+        lit
     }
 
     /// Mixed between straight down and straight up by the direction's height.
-    fn sky(&self, direction: Vec3A) -> Vec3A {
+    pub(crate) fn sky(&self, direction: Vec3A) -> Vec3A {
         let [down, up] = self.scene().sky.map(Vec3A::from);
         let height = direction.normalize_or_zero().y;
         down.lerp(up, 0.5 + 0.5 * height)
     }
 }
 
-fn sky_surface(ray: &Ray) -> Surface {
+/// Light that reaches a point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Arriving {
+    /// Unit length, world coordinates.
+    pub(crate) to_light: Vec3A,
+    /// Of a surface that faces the light.
+    pub(crate) irradiance: Vec3A,
+    /// To the shading normal; positive.
+    cos: f32,
+}
+
+impl Arriving {
+    /// What a matte surface sends back of it, per albedo.
+    #[inline(always)]
+    pub(crate) fn per_albedo(&self) -> Vec3A {
+        self.irradiance * (self.cos * FRAC_1_PI)
+    }
+}
+
+pub(crate) fn sky_surface(ray: &Ray) -> Surface {
     Surface {
         object: Surface::SKY,
         primitive: 0,
@@ -229,7 +205,7 @@ fn reflect(direction: Vec3A, point: &Point) -> Vec3A {
 }
 
 /// Radiance as promised: what is not a number becomes black, what is beyond all numbers the largest.
-fn finite(radiance: Vec3A) -> [f32; 3] {
+pub(crate) fn finite(radiance: Vec3A) -> [f32; 3] {
     radiance.to_array().map(|c| if c.is_nan() { 0.0 } else { c.clamp(0.0, f32::MAX) })
 }
 

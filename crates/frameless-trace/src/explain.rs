@@ -3,7 +3,8 @@
 use frameless::{Display, Request, Size};
 
 use crate::camera::{Camera, ViewSource};
-use crate::direct::{Probe, Settings};
+use crate::direct::Probe;
+use crate::integrator::Settings;
 use crate::traverse::Stack;
 use crate::world::World;
 

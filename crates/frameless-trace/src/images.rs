@@ -17,7 +17,7 @@ use glam::{Affine3A, DVec3, Mat3A, Vec3A};
 
 use crate::camera::Camera;
 use crate::planes::{Plane, planes};
-use crate::top::Placed;
+use crate::top::{Placed, Shape};
 
 /// The plane mirrors of a scene, and the numbers of what is seen in them.
 pub(crate) struct Mirrors {
@@ -58,6 +58,10 @@ impl Mirrors {
         let (mut first_of, mut mirrors) = (Vec::new(), Vec::new());
         for (instance, placed) in scene.instances.iter().enumerate() {
             first_of.push(mirrors.len() as u32);
+            if scene.deformation_of(instance).is_some() {
+                // What bends is no plane.
+                continue;
+            }
             let planes = planes[placed.geometry as usize].iter().cloned();
             mirrors.extend(planes.map(|plane| Mirror { instance: instance as u32, plane }));
         }
@@ -78,6 +82,9 @@ impl Mirrors {
         placed: &Placed,
         direction: Vec3A,
     ) -> Option<MirrorSide> {
+        if matches!(placed.shape, Shape::Deforming(_)) {
+            return None;
+        }
         let plane = (*self.plane_of[geometry as usize].get(primitive as usize)?)?;
         let mirror = self.first_of[instance as usize] + u32::from(plane);
         let normal = normal_in_world(placed, &self.mirrors[mirror as usize].plane);

@@ -2,22 +2,29 @@
 //!
 //! The way of one sample: [`World`] holds what never changes (bottom-level BVHs, textures); a [`Moment`] is the world at one
 //! time (transforms, lights, the top-level BVH over the instances); [`World::trace`] sends one pixel's ray into a moment
-//! and shades what it hits with the deterministic Whitted integrator. [`CpuTracer`] does so for whole batches beside the
+//! and shades what it hits with one of the two integrators, deterministic or by random paths. [`CpuTracer`] does so for whole batches beside the
 //! loop, [`render`] for whole pictures, [`explain`] for one pixel in words.
 
+mod bsdf;
 mod build;
 mod camera;
 mod cpu;
+mod deforming;
 mod direct;
+mod emitters;
 mod explain;
+mod first;
 mod images;
+mod integrator;
 mod kernel;
 mod lights;
 mod moment;
 mod order;
+mod path;
 mod planes;
 mod point;
 mod ray;
+mod refit;
 mod render;
 mod sphere;
 mod texture;
@@ -27,6 +34,10 @@ mod wide;
 mod world;
 
 #[cfg(test)]
+mod bending;
+#[cfg(test)]
+mod light_transport;
+#[cfg(test)]
 mod reference;
 #[cfg(test)]
 mod shading;
@@ -35,9 +46,9 @@ mod test_scenes;
 
 pub use camera::{Camera, ViewSource};
 pub use cpu::{CpuTracer, thread_pool};
-pub use direct::Settings;
 pub use explain::explain;
+pub use integrator::{Integrator, Settings};
 pub use moment::Moment;
 pub use ray::Ray;
-pub use render::render;
+pub use render::{Still, render, render_still};
 pub use world::World;

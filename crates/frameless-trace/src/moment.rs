@@ -6,8 +6,9 @@ use frameless_scene::{Geometry, State, View};
 use glam::Affine3A;
 
 use crate::camera::Camera;
+use crate::deforming::Deforming;
 use crate::lights::lights_now;
-use crate::top::{Placed, Shape, Targets, Top};
+use crate::top::{Placed, Shape, Targets, Top, Trees};
 use crate::world::World;
 
 /// A [`World`] at one time: where everything is, how bright the lights are, and the top-level BVH. Its memory can be used
@@ -17,6 +18,8 @@ pub struct Moment {
     shows: Option<(u64, f64)>,
     state: State,
     placed: Vec<Placed>,
+    /// Per deformation of the scene.
+    deforming: Vec<Deforming>,
     top: Top,
     pub(crate) lights: Vec<Light>,
 }
@@ -31,8 +34,19 @@ impl Moment {
         &self.placed[instance as usize]
     }
 
+    /// What deforms there, if it does.
+    #[inline]
+    pub(crate) fn deforming(&self, placed: &Placed) -> Option<&Deforming> {
+        match placed.shape {
+            Shape::Deforming(index) => Some(&self.deforming[index as usize]),
+            Shape::Mesh(_) | Shape::Sphere => None,
+        }
+    }
+
+    #[inline]
     pub(crate) fn targets<'a>(&'a self, world: &'a World) -> Targets<'a> {
-        Targets { top: &self.top, placed: &self.placed, blas: &world.blas, isa: world.isa }
+        let trees = Trees { rigid: &world.blas, deforming: &self.deforming };
+        Targets { top: &self.top, placed: &self.placed, trees, isa: world.isa }
     }
 }
 
@@ -55,6 +69,7 @@ impl World {
             shows: None,
             state: State::default(),
             placed: Vec::new(),
+            deforming: Vec::new(),
             top: Top::new(),
             lights: Vec::new(),
         };
@@ -63,7 +78,7 @@ impl World {
     }
 
     /// Make `moment`, of this or any other world, show this world at `secs`. Does nothing if it does so already, and leaves
-    /// the top-level BVH alone if no instance has moved.
+    /// the BVHs alone of what has not moved.
     pub fn update_moment(&self, secs: f64, moment: &mut Moment) {
         if moment.shows == Some((self.id, secs)) {
             return;
@@ -86,9 +101,15 @@ impl World {
         lights_now(self.scene(), &moment.state, &mut moment.lights);
         if !same_world {
             moment.placed.clear();
+            moment.deforming.clone_from(&self.deforming);
         }
-        if self.place_instances(moment) || !same_world {
-            moment.top.rebuild(&moment.placed, &self.blas);
+        let mut moved = self.place_instances(moment);
+        for (index, deforming) in moment.deforming.iter_mut().enumerate() {
+            moved |= deforming.update(self.scene(), index, &moment.state);
+        }
+        if moved || !same_world {
+            let trees = Trees { rigid: &self.blas, deforming: &moment.deforming };
+            moment.top.rebuild(&moment.placed, trees);
         }
         // No time equals NaN: what the scene shows by itself at this time is another picture.
         moment.shows = Some((self.id, f64::NAN));
@@ -104,32 +125,42 @@ impl World {
         pose.picture_from_object.extend(instances);
         pose.picture_from_sky = camera.picture_from_direction();
         pose.deformed.clear();
+        if !moment.deforming.is_empty() {
+            let deformed = |placed: &Placed| moment.deforming(placed).map(Deforming::vertices);
+            pose.deformed.extend(moment.placed.iter().map(deformed));
+        }
         self.mirrors.pose(&moment.placed, &camera, pose);
     }
 
-    /// Fills in the lights of `moment`, which shows this world, and how every instance stands in it; what is seen in mirrors is lit
+    /// Fills in the lights of `moment`, which shows this world, and how every instance that does not deform stands in it; what is seen in mirrors is lit
     /// where it is.
     pub fn lighting(&self, moment: &Moment, lighting: &mut Lighting) {
         lighting.lights.clone_from(&moment.lights);
         lighting.world_from_object.clear();
-        let placements =
-            moment.placed.iter().map(|placed| Some(placement(&placed.world_from_object)));
+        let placements = moment.placed.iter().map(|placed| {
+            let is_rigid = moment.deforming(placed).is_none();
+            is_rigid.then(|| placement(&placed.world_from_object))
+        });
         lighting.world_from_object.extend(placements);
         self.mirrors.repeat(&mut lighting.world_from_object, None);
     }
 
     /// Whether any instance has moved.
     fn place_instances(&self, moment: &mut Moment) -> bool {
-        let mut moved = false;
+        let (mut moved, geometries) = (false, &self.scene().geometries);
         for (index, instance) in self.scene().instances.iter().enumerate() {
-            let world_from_object = moment.state.world_from_node[instance.node as usize];
+            let world_from_object = self.scene().world_from_instance(index, &moment.state);
             match moment.placed.get_mut(index) {
                 Some(placed) if placed.world_from_object == world_from_object => continue,
                 Some(placed) => *placed = Placed::new(world_from_object, placed.shape),
                 None => {
-                    let shape = match self.scene().geometries[instance.geometry as usize] {
-                        Geometry::Mesh(_) => Shape::Mesh(instance.geometry),
-                        Geometry::Sphere { .. } => Shape::Sphere,
+                    let deformation = self.scene().deformation_of(index);
+                    let shape = match (&geometries[instance.geometry as usize], deformation) {
+                        (Geometry::Mesh(_), Some(deformation)) => {
+                            Shape::Deforming(deformation as u32)
+                        }
+                        (Geometry::Mesh(_), None) => Shape::Mesh(instance.geometry),
+                        (Geometry::Sphere { .. }, _) => Shape::Sphere,
                     };
                     moment.placed.push(Placed::new(world_from_object, shape));
                 }

@@ -1,9 +1,9 @@
 //! The point that a ray hit: where it is, which way it faces, what it is made of.
 
-use frameless_scene::{Geometry, Material, Mesh};
+use frameless::Surface;
+use frameless_scene::{Deformed, Geometry, Material, Mesh};
 use glam::{Vec2, Vec3A, Vec4};
 
-use crate::build::corners;
 use crate::moment::Moment;
 use crate::ray::{Hit, Ray};
 use crate::sphere;
@@ -26,6 +26,9 @@ pub(crate) struct Point {
     pub(crate) normal: Vec3A,
     /// Hit point in the object's coordinates.
     pub(crate) local_position: Vec3A,
+    /// What finds the point again, see [`frameless::Surface::position`]: barycentric weights if the object deforms, else
+    /// `local_position`.
+    pub(crate) anchor: Vec3A,
     /// Unit shading normal in the object's coordinates.
     pub(crate) local_normal: Vec3A,
     /// Texture coordinates, where the material has a texture.
@@ -39,6 +42,7 @@ pub(crate) struct Point {
 /// A point before the object's transform. Normals on the ray's side, of any length; may be zero.
 struct Local {
     position: Vec3A,
+    anchor: Vec3A,
     shadow_origin: Vec3A,
     geometric_normal: Vec3A,
     normal: Vec3A,
@@ -50,6 +54,19 @@ struct Local {
 }
 
 impl Point {
+    /// What a sample says of the point; `per_albedo`: the direct light that a white surface would send back.
+    pub(crate) fn surface(&self, hit: &Hit, albedo: Vec3A, per_albedo: Vec3A, lit: u32) -> Surface {
+        Surface {
+            object: hit.instance,
+            primitive: hit.primitive,
+            position: self.anchor.to_array(),
+            normal: self.local_normal.to_array(),
+            albedo: albedo.to_array(),
+            direct: (albedo * per_albedo).to_array(),
+            lit,
+        }
+    }
+
     #[inline]
     pub(crate) fn new(world: &World, moment: &Moment, ray: &Ray, hit: &Hit) -> Point {
         let scene = world.scene();
@@ -57,7 +74,16 @@ impl Point {
         let placed = moment.placed(hit.instance);
         let local_ray = ray.transformed(&placed.object_from_world);
         let local = match &scene.geometries[geometry as usize] {
-            Geometry::Mesh(mesh) => on_mesh(mesh, &scene.materials, &local_ray, hit),
+            Geometry::Mesh(mesh) => {
+                let materials = &scene.materials;
+                match moment.deforming(placed) {
+                    None => on_mesh(mesh, &Rigid(mesh), materials, &local_ray, hit),
+                    Some(deforming) => {
+                        let local = on_mesh(mesh, deforming.now(), materials, &local_ray, hit);
+                        Local { anchor: weights(hit).into(), ..local }
+                    }
+                }
+            }
             Geometry::Sphere { material } => on_sphere(*material, &local_ray, hit.t),
         };
         let material = &scene.materials[local.material as usize];
@@ -65,6 +91,57 @@ impl Point {
             Vec3A::from_vec4(material.base_color) * local.color * texel(world, material, local.uv);
         into_world(ray, placed, &local, base)
     }
+}
+
+/// What of a mesh may deform.
+trait Vertices {
+    fn position(&self, vertex: usize) -> Vec3A;
+    /// `None` if the mesh has no normals.
+    fn normal(&self, vertex: usize) -> Option<Vec3A>;
+    fn colors(&self) -> &[Vec4];
+}
+
+struct Rigid<'a>(&'a Mesh);
+
+impl Vertices for Rigid<'_> {
+    #[inline(always)]
+    fn position(&self, vertex: usize) -> Vec3A {
+        self.0.positions[vertex].into()
+    }
+
+    #[inline(always)]
+    fn normal(&self, vertex: usize) -> Option<Vec3A> {
+        self.0.normals.get(vertex).map(|&normal| normal.into())
+    }
+
+    #[inline(always)]
+    fn colors(&self) -> &[Vec4] {
+        &self.0.colors
+    }
+}
+
+impl Vertices for Deformed {
+    #[inline(always)]
+    fn position(&self, vertex: usize) -> Vec3A {
+        self.positions()[vertex]
+    }
+
+    #[inline(always)]
+    fn normal(&self, vertex: usize) -> Option<Vec3A> {
+        self.normals().get(vertex).copied()
+    }
+
+    #[inline(always)]
+    fn colors(&self) -> &[Vec4] {
+        self.colors()
+    }
+}
+
+/// Of the triangle's three vertices.
+#[inline(always)]
+fn weights(hit: &Hit) -> [f32; 3] {
+    let [v, w] = hit.barycentric;
+    [1.0 - v - w, v, w]
 }
 
 fn texel(world: &World, material: &Material, uv: [f32; 2]) -> Vec3A {
@@ -81,6 +158,7 @@ fn on_sphere(material: u32, ray: &Ray, t: f32) -> Local {
     let normal = if position.dot(ray.direction) > 0.0 { -position } else { position };
     Local {
         position,
+        anchor: position,
         shadow_origin: position,
         geometric_normal: normal,
         normal,
@@ -92,22 +170,27 @@ fn on_sphere(material: u32, ray: &Ray, t: f32) -> Local {
 }
 
 #[inline]
-fn on_mesh(mesh: &Mesh, materials: &[Material], ray: &Ray, hit: &Hit) -> Local {
+fn on_mesh(
+    mesh: &Mesh,
+    now: &impl Vertices,
+    materials: &[Material],
+    ray: &Ray,
+    hit: &Hit,
+) -> Local {
     let material = mesh.triangle_materials[hit.primitive as usize];
     let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
-    let corners = corners(mesh, hit.primitive).map(Vec3A::from);
+    let corners = vertices.map(|vertex| now.position(vertex));
     let [a, b, c] = corners;
-    let [v, w] = hit.barycentric;
-    let weights = [1.0 - v - w, v, w];
+    let weights = weights(hit);
     let position = blend(weights, corners);
     let winding_normal = (b - a).cross(c - a);
     let geometric_normal = facing(winding_normal, -ray.direction);
-    let (normal, shadow_origin) = if mesh.normals.is_empty() {
-        (geometric_normal, position)
-    } else {
-        let normals = vertices.map(|vertex| Vec3A::from(mesh.normals[vertex]));
-        let normals = normals.map(|normal| facing(normal, geometric_normal));
-        (blend(weights, normals), on_smooth_surface(position, weights, corners, normals))
+    let (normal, shadow_origin) = match vertices.map(|vertex| now.normal(vertex)) {
+        [Some(a), Some(b), Some(c)] => {
+            let normals = [a, b, c].map(|normal| facing(normal, geometric_normal));
+            (blend(weights, normals), on_smooth_surface(position, weights, corners, normals))
+        }
+        _ => (geometric_normal, position),
     };
     let uv = match materials[material as usize].base_color_texture {
         Some(reference) if !mesh.uvs[reference.uv_set as usize].is_empty() => {
@@ -117,16 +200,26 @@ fn on_mesh(mesh: &Mesh, materials: &[Material], ray: &Ray, hit: &Hit) -> Local {
         }
         _ => Vec2::ZERO.to_array(),
     };
-    let color = if mesh.colors.is_empty() {
+    let color = if now.colors().is_empty() {
         Vec3A::ONE
     } else {
         blend(
             weights,
-            vertices.map(|vertex| Vec3A::from_vec4(Vec4::max(mesh.colors[vertex], Vec4::ZERO))),
+            vertices.map(|vertex| Vec3A::from_vec4(Vec4::max(now.colors()[vertex], Vec4::ZERO))),
         )
     };
     let extent = a.abs().max(b.abs()).max(c.abs());
-    Local { position, shadow_origin, geometric_normal, normal, extent, uv, color, material }
+    Local {
+        position,
+        anchor: position,
+        shadow_origin,
+        geometric_normal,
+        normal,
+        extent,
+        uv,
+        color,
+        material,
+    }
 }
 
 #[inline(always)]
@@ -191,6 +284,7 @@ fn into_world(ray: &Ray, placed: &Placed, local: &Local, base: Vec3A) -> Point {
         geometric_normal,
         normal,
         local_position: local.position,
+        anchor: local.anchor,
         local_normal: local_normal.try_normalize().unwrap_or(Vec3A::Y),
         uv: local.uv,
         base,

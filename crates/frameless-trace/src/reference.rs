@@ -13,7 +13,7 @@ use crate::ray::{Hit, Ray};
 use crate::test_scenes as scenes;
 use crate::traverse::Stack;
 
-fn ray(origin: Vec3, direction: Vec3) -> Ray {
+pub(crate) fn ray(origin: Vec3, direction: Vec3) -> Ray {
     Ray { origin: origin.into(), direction: direction.into() }
 }
 
@@ -23,7 +23,7 @@ fn one_mesh(mesh: Mesh) -> World {
     World::new(Arc::new(scene))
 }
 
-fn as_mesh(geometry: Geometry) -> Mesh {
+pub(crate) fn as_mesh(geometry: Geometry) -> Mesh {
     let Geometry::Mesh(mesh) = geometry else { panic!("a mesh was asked for") };
     mesh
 }
@@ -35,7 +35,7 @@ fn closest(world: &World, rays: &[Ray]) -> Vec<Option<Hit>> {
 }
 
 /// Every triangle, one after the other, with the portable test.
-fn every_triangle(mesh: &Mesh, ray: &Ray) -> Vec<(u32, f32)> {
+pub(crate) fn every_triangle(mesh: &Mesh, ray: &Ray) -> Vec<(u32, f32)> {
     let shear = ShearRay::new(ray);
     let hits = (0..mesh.triangles.len() as u32).filter_map(|primitive| {
         let vertex = corners(mesh, primitive).map(|corner| corner.to_array().map(|c| [c; 4]));
@@ -61,7 +61,7 @@ fn in_double(mesh: &Mesh, primitive: u32, ray: &Ray) -> Option<(f64, f64)> {
     (inside >= 0.0 && t > 0.0).then_some((t, inside))
 }
 
-fn random_soup(rng: &mut Rng, count: u32, size: f32) -> Mesh {
+pub(crate) fn random_soup(rng: &mut Rng, count: u32, size: f32) -> Mesh {
     let mut positions = Vec::new();
     for _ in 0..count {
         let centre = 3.0 * rng.unit_f32() * scenes::unit(rng);
@@ -71,7 +71,7 @@ fn random_soup(rng: &mut Rng, count: u32, size: f32) -> Mesh {
     as_mesh(scenes::mesh(positions, triangles, 0))
 }
 
-fn random_rays(rng: &mut Rng, count: usize) -> Vec<Ray> {
+pub(crate) fn random_rays(rng: &mut Rng, count: usize) -> Vec<Ray> {
     let random = |rng: &mut Rng| {
         let origin = 6.0 * rng.unit_f32() * scenes::unit(rng);
         let target = 3.0 * rng.unit_f32() * scenes::unit(rng);

@@ -1,13 +1,29 @@
 //! Whole pictures.
 
 use frameless::{Request, Size};
+use glam::Vec3;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use crate::camera::{Camera, ViewSource};
-use crate::direct::{NoProbe, Settings};
+use crate::integrator::Settings;
 use crate::traverse::Stack;
 use crate::world::World;
+
+/// A picture of one moment, with as many samples per pixel as wanted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Still {
+    /// Scene time in seconds.
+    pub secs: f64,
+    /// From where.
+    pub view: ViewSource,
+    /// In pixels.
+    pub size: Size,
+    /// How light is followed.
+    pub settings: Settings,
+    /// Per pixel, at least 1: the first of its sequence ([`Request::in_sequence`]), spread over the pixel.
+    pub samples: u32,
+}
 
 /// The picture of an ideal renderer that takes no time: every pixel's centre at exactly `secs`. Row-major linear RGB.
 pub fn render(
@@ -18,16 +34,34 @@ pub fn render(
     settings: &Settings,
     pool: &ThreadPool,
 ) -> Vec<[f32; 3]> {
-    let moment = world.moment(secs);
-    let camera = Camera::new(&view.at(world.scene(), moment.state()), size);
+    let still = Still { secs, view: *view, size, settings: *settings, samples: 1 };
+    render_still(world, &still, pool, || ())
+}
+
+/// The mean of every pixel's samples. Row-major linear RGB. `row_done` is told of every finished row, by any thread.
+pub fn render_still(
+    world: &World,
+    still: &Still,
+    pool: &ThreadPool,
+    row_done: impl Fn() + Sync,
+) -> Vec<[f32; 3]> {
+    let (size, samples) = (still.size, still.samples.max(1));
+    let moment = world.moment(still.secs);
+    let camera = Camera::new(&still.view.at(world.scene(), moment.state()), size);
     let mut image = vec![[0.0; 3]; size.pixels()];
     pool.install(|| {
         let rows = image.par_chunks_mut(size.width as usize).zip(0..size.height);
         rows.for_each_init(Stack::new, |stack, (row, y)| {
             for (x, colour) in (0..).zip(row) {
-                let ray = camera.ray(&Request::centre(size.index(x, y)));
-                *colour = world.radiance(&moment, ray, settings, stack, &mut NoProbe).0;
+                let mut sum = Vec3::ZERO;
+                for k in 0..samples {
+                    let request = Request::in_sequence(size.index(x, y), k);
+                    let (rgb, _) = world.sample(&moment, &camera, &request, &still.settings, stack);
+                    sum += Vec3::from(rgb);
+                }
+                *colour = (sum / samples as f32).to_array();
             }
+            row_done();
         });
     });
     image

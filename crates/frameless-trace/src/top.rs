@@ -6,6 +6,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 use crate::build::{Blas, binary_by_median};
+use crate::deforming::Deforming;
 #[cfg(target_arch = "x86_64")]
 use crate::kernel::avx2;
 use crate::kernel::{Isa, Kernel, Portable, ShearRay, SlabRay};
@@ -21,6 +22,27 @@ pub(crate) enum Shape {
     Sphere,
     /// Index of a bottom-level BVH, which is that of the geometry.
     Mesh(u32),
+    /// Index of a bottom-level BVH that moves, which is that of the deformation.
+    Deforming(u32),
+}
+
+/// The bottom-level BVHs at one moment.
+#[derive(Clone, Copy)]
+pub(crate) struct Trees<'a> {
+    pub(crate) rigid: &'a [Blas],
+    pub(crate) deforming: &'a [Deforming],
+}
+
+impl<'a> Trees<'a> {
+    /// `None` for spheres.
+    #[inline(always)]
+    pub(crate) fn of(&self, shape: Shape) -> Option<&'a Blas> {
+        match shape {
+            Shape::Sphere => None,
+            Shape::Mesh(index) => Some(&self.rigid[index as usize]),
+            Shape::Deforming(index) => Some(&self.deforming[index as usize].tree.blas),
+        }
+    }
 }
 
 /// An instance at one moment.
@@ -37,10 +59,10 @@ impl Placed {
     }
 
     /// World box; `None` where nothing can be hit: no triangles, or a transform without an inverse (a scale of zero).
-    fn bounds(&self, blas: &[Blas]) -> Option<Aabb> {
-        let (low, high) = match self.shape {
-            Shape::Sphere => (Vec3A::NEG_ONE, Vec3A::ONE),
-            Shape::Mesh(mesh) => blas[mesh as usize].bounds?,
+    fn bounds(&self, trees: Trees<'_>) -> Option<Aabb> {
+        let (low, high) = match trees.of(self.shape) {
+            None => (Vec3A::NEG_ONE, Vec3A::ONE),
+            Some(blas) => blas.bounds?,
         };
         let inverse = &self.object_from_world;
         let invertible = inverse.matrix3.is_finite() && inverse.translation.is_finite();
@@ -55,7 +77,7 @@ impl Placed {
                 let rows = m.matrix3.transpose();
                 Vec3A::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length())
             }
-            Shape::Mesh(_) => m.matrix3.abs() * (0.5 * (high - low)),
+            Shape::Mesh(_) | Shape::Deforming(_) => m.matrix3.abs() * (0.5 * (high - low)),
         };
         // Rounding in the box and in the ray's way into the instance: a handful of operations each.
         const PADDING: f32 = 16.0 * f32::EPSILON;
@@ -88,11 +110,11 @@ impl Top {
     }
 
     /// Build from scratch: a few µs for a hundred instances.
-    pub(crate) fn rebuild(&mut self, placed: &[Placed], blas: &[Blas]) {
+    pub(crate) fn rebuild(&mut self, placed: &[Placed], trees: Trees<'_>) {
         self.boxes.clear();
         self.instances.clear();
         for (instance, placed) in placed.iter().enumerate() {
-            if let Some(bounds) = placed.bounds(blas) {
+            if let Some(bounds) = placed.bounds(trees) {
                 self.boxes.push(bounds);
                 self.instances.push(instance as u32);
             }
@@ -129,7 +151,7 @@ impl Top {
 pub(crate) struct Targets<'a> {
     pub(crate) top: &'a Top,
     pub(crate) placed: &'a [Placed],
-    pub(crate) blas: &'a [Blas],
+    pub(crate) trees: Trees<'a>,
     pub(crate) isa: Isa,
 }
 
@@ -233,15 +255,12 @@ impl<K: Kernel, const ANY: bool> Leaves for Instances<'_, K, ANY> {
             let placed = &self.targets.placed[instance as usize];
             // Not normalised, so that t means the same here and in the world.
             let local = self.ray.transformed(&placed.object_from_world);
-            let hit = match placed.shape {
-                Shape::Sphere => sphere::intersect(&local, *t_max).map(|t| {
+            let hit = match self.targets.trees.of(placed.shape) {
+                None => sphere::intersect(&local, *t_max).map(|t| {
                     *t_max = t;
                     Hit { t, barycentric: [0.0; 2], primitive: 0, instance }
                 }),
-                Shape::Mesh(mesh) => {
-                    let blas = &self.targets.blas[mesh as usize];
-                    in_mesh::<K, ANY>(blas, &local, instance, t_max, stack)
-                }
+                Some(blas) => in_mesh::<K, ANY>(blas, &local, instance, t_max, stack),
             };
             if let Some(hit) = hit {
                 self.hit = hit;

@@ -15,8 +15,10 @@ pub(crate) struct Node {
 impl Node {
     const EMPTY: Node = {
         let (low, high) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
-        Node { bounds: [low, high, low, high, low, high], child: [Child(u32::MAX); 8] }
+        Node { bounds: [low, high, low, high, low, high], child: [Node::UNUSED; 8] }
     };
+    /// The child of a slot without one.
+    pub(crate) const UNUSED: Child = Child(u32::MAX);
 }
 
 /// An inner node's index, or a leaf: bit 31 set, then 2 bits of length − 1, then 29 bits of index.

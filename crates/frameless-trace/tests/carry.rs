@@ -155,6 +155,29 @@ fn objects_may_come_through_the_camera() {
 }
 
 #[test]
+fn a_mirror_at_rest_shows_what_it_should_after_a_flight_around_it() {
+    let world = world("shadow");
+    // From before the mirror to behind it, and back.
+    let at = |k: u64| {
+        let k = k.min(40) as f32;
+        let z = 4.9 - 5.0 * (k * std::f32::consts::PI / 40.0).sin();
+        view(Vec3::new(-1.6, 1.8, z), 0.5)
+    };
+    let mut engine = engine(&world, at(0), 80_000.0);
+    for k in 1..=40 {
+        play(&mut engine, k, at(k));
+    }
+    let (now, scene_secs) = (engine.now(), 40.0 / 60.0);
+    engine.timeline_mut().seek(now, scene_secs);
+    engine.timeline_mut().pause(now);
+    let mut picture = Vec::new();
+    for k in 41..=100 {
+        picture = play(&mut engine, k, at(k));
+    }
+    assert_eq!(rmse(&picture, &ideal(&world, at(40), scene_secs)), 0.0);
+}
+
+#[test]
 fn what_is_behind_the_camera_has_no_place_in_the_picture() {
     let world = world("orbit");
     let (moment, mut pose) = (world.moment(0.0), Pose::default());

@@ -43,12 +43,16 @@ const drives = () => state !== null && state.driver === client;
 
 // ---- to the server ----
 
-/** Asks for something that only who drives may; `when` it happened, if its latency is to be measured. */
+/** Whether this page may change anything; if not, it says why. Where nobody drives, whoever does something drives. */
+function mayAsk() {
+  if (state === null || state.driver === null || drives()) return true;
+  messages.info("you are watching; take the controls to change anything");
+  return false;
+}
+
+/** Does something that shows in the picture; `when` it happened, if its latency is to be measured. */
 function ask(message, when = null) {
-  if (state !== null && state.driver !== null && !drives()) {
-    messages.info("you are watching; take the controls to change anything");
-    return;
-  }
+  if (!mayAsk()) return;
   inputs++;
   if (connection.send({ ...message, input: inputs }) && when !== null) latency.sent(inputs, when);
 }
@@ -227,7 +231,7 @@ on("camera", "change", () => ask({ type: "look_through", camera: Number(byId("ca
 on("scenes", "change", () => {
   const name = byId("scenes").value;
   byId("scenes").value = "";
-  if (name !== "") ask({ type: "open", name });
+  if (name !== "" && mayAsk()) connection.send({ type: "open", name });
 });
 on("home", "click", (event) => comeBack(event.timeStamp));
 on("save", "click", savePng);

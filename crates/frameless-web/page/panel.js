@@ -27,7 +27,7 @@ function option(value, text) {
 
 export class Panel {
   #set;
-  #touched = 0;
+  #touched = -Infinity;
   #state = null;
   #rate = FIRST_RATE;
   #hints = new Map();
@@ -46,7 +46,7 @@ export class Panel {
       return Object.assign(option(name, name), { title: description });
     }));
     byId("overlays").replaceChildren(...overlays.map(overlayChoice));
-    const first = option("", "scene …");
+    const first = option("", "pick …");
     byId("scenes").replaceChildren(first, ...scenes.map(({ name, description }) => {
       return Object.assign(option(name, name), { title: description });
     }));

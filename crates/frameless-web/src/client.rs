@@ -14,7 +14,7 @@ use tokio::time::{MissedTickBehavior, interval, sleep_until, timeout};
 use crate::hub::{Event, HubHandle};
 use crate::mailbox::Mailbox;
 use crate::tiles::{Flow, Published};
-use crate::wire::{Ack, Said, StatusMessage, WireError};
+use crate::wire::{Ack, LONGEST_MESSAGE, Said, StatusMessage, WireError};
 
 use outgoing::{Outgoing, Ready, Room};
 
@@ -31,6 +31,8 @@ enum End {
     Gone,
     /// It sent what must not be.
     Invalid(WireError),
+    /// It sent more than may be.
+    TooLong,
     /// It has not moved for too long.
     Stalled,
 }
@@ -199,6 +201,9 @@ impl Connection {
     async fn hear(&mut self, message: Message) -> Result<(), End> {
         let now = Instant::now();
         self.heard_at = now;
+        if message_bytes(&message) > LONGEST_MESSAGE as u64 {
+            return Err(End::TooLong);
+        }
         match message {
             Message::Text(text) => {
                 let said = Said::parse(&text).map_err(End::Invalid)?;
@@ -278,6 +283,7 @@ impl Connection {
         let (code, reason) = match end {
             End::Gone => (close_code::AWAY, String::new()),
             End::Invalid(error) => (close_code::POLICY, error.to_string()),
+            End::TooLong => (close_code::SIZE, "a message of more than 1 MiB".to_owned()),
             End::Stalled => (close_code::AWAY, "not heard of for too long".to_owned()),
         };
         let frame = CloseFrame { code, reason: shortened(&reason).into() };

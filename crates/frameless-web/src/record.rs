@@ -265,7 +265,6 @@ mod tests {
         show.send_replace(Some(Arc::new(other)));
         while pieces.blocking_recv().is_some() {}
         let listening = begin(pictures.clone()).expect("a thread");
-        assert_eq!(show.receiver_count(), 2);
         drop(listening);
         let begun = Instant::now();
         while show.receiver_count() > 1 && begun.elapsed() < Duration::from_secs(10) {

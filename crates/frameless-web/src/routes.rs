@@ -23,6 +23,9 @@ use crate::guard::{Admission, Guard};
 use crate::hub::{Event, HubHandle, Upload, UploadRefused};
 use crate::tiles::Published;
 use crate::wire::LONGEST_MESSAGE;
+
+/// What is too long is read so far, so that the client can be told; from more the connection breaks off.
+const LONGEST_READ: usize = 2 * LONGEST_MESSAGE;
 use crate::{page, record};
 
 /// What every request may need.
@@ -138,7 +141,7 @@ async fn stream(State(shared): App, upgrade: WebSocketUpgrade) -> Response {
     };
     let client = shared.next_client.fetch_add(1, Ordering::Relaxed);
     let (hub, stalled) = (shared.hub.clone(), shared.stalled);
-    upgrade.max_message_size(LONGEST_MESSAGE).max_frame_size(LONGEST_MESSAGE).on_upgrade(
+    upgrade.max_message_size(LONGEST_READ).max_frame_size(LONGEST_READ).on_upgrade(
         async move |socket| {
             client::serve(client, socket, hub, stalled).await;
             drop(seat);

@@ -11,7 +11,7 @@ pub const MOST_PIXELS: usize = 3840 * 2160;
 // A picture in ten seconds of the smallest size, and more than any renderer traces.
 const RATES: std::ops::RangeInclusive<f64> = 1.0..=1e12;
 // 2^±64 reaches from the darkest to the brightest light there is.
-const MOST_STOPS: f32 = 64.0;
+const STOPS: std::ops::RangeInclusive<f32> = -64.0..=64.0;
 const TILES: std::ops::RangeInclusive<u32> = 1..=64;
 
 /// What the panel shows.
@@ -26,7 +26,7 @@ pub(crate) fn state(settings: &Settings) -> SettingsState {
         temporal,
         w_d,
         tile,
-        reconstruction: settings.reconstruction.name().into(),
+        reconstruction: settings.reconstruction.name(),
         samples_per_sec: settings.samples_per_sec,
         exposure_stops: settings.exposure_stops,
         overlay: overlay_name(settings.overlay),
@@ -60,8 +60,7 @@ pub(crate) fn changed(settings: &Settings, change: &SettingsChange) -> Result<Se
         };
     }
     if let Some(stops) = change.exposure_stops {
-        // Not `> MOST_STOPS`: NaN is refused, too.
-        if !(stops.abs() <= MOST_STOPS) {
+        if !STOPS.contains(&stops) {
             return Err(format!("an exposure of {stops} stops: wanted -64 to 64"));
         }
         new.exposure_stops = stops;
@@ -121,15 +120,14 @@ fn picture(name: &str) -> Result<PictureSize, String> {
         "whole-window" => Ok(PictureSize::WHOLE_WINDOW),
         size => {
             let sides = size.split_once('x').and_then(|(width, height)| {
-                Some((width.parse::<u16>().ok()?, height.parse::<u16>().ok()?))
+                Some((width.parse::<u32>().ok()?, height.parse::<u32>().ok()?))
             });
             match sides {
-                Some((width, height)) if is_allowed(Size::new(width.into(), height.into())) => {
-                    Ok(PictureSize::Fixed(Size::new(width.into(), height.into())))
-                }
-                Some(_) => Err(format!(
-                    "a picture of {size}: wanted at least 1x1 and at most {MOST_PIXELS} pixels"
-                )),
+                Some(sides) => allowed(sides).map(PictureSize::Fixed).ok_or_else(|| {
+                    format!(
+                        "a picture of {size}: wanted sides of 1 to 65535 and at most {MOST_PIXELS} pixels"
+                    )
+                }),
                 None => Err(format!(
                     "a picture of {}: wanted window, whole-window or a size such as 512x384",
                     quoted(size)
@@ -139,11 +137,13 @@ fn picture(name: &str) -> Result<PictureSize, String> {
     }
 }
 
-/// Whether a picture may have that size here.
-pub(crate) fn is_allowed(size: Size) -> bool {
-    (1..=MOST_PIXELS).contains(&size.pixels())
-        && size.width <= u32::from(u16::MAX)
-        && size.height <= u32::from(u16::MAX)
+/// That size, if a picture may have it here.
+fn allowed((width, height): (u32, u32)) -> Option<Size> {
+    let sides = 1..=u32::from(u16::MAX);
+    let is_allowed = sides.contains(&width)
+        && sides.contains(&height)
+        && width as usize * height as usize <= MOST_PIXELS;
+    is_allowed.then(|| Size::new(width, height))
 }
 
 fn picture_name(picture: PictureSize) -> String {
@@ -250,9 +250,10 @@ mod tests {
             (r#"{"type": "settings", "temporal": 2}"#, "0 to 1"),
             (r#"{"type": "settings", "w_d": 0.5}"#, "no w_d"),
             (r#"{"type": "settings", "sampler": "change", "tile": 65}"#, "1 to 64"),
-            (r#"{"type": "settings", "picture": "99999x1"}"#, "512x384"),
+            (r#"{"type": "settings", "picture": "99999x1"}"#, "65535"),
             (r#"{"type": "settings", "picture": "65535x65535"}"#, "pixels"),
-            (r#"{"type": "settings", "picture": "0x5"}"#, "1x1"),
+            (r#"{"type": "settings", "picture": "large"}"#, "512x384"),
+            (r#"{"type": "settings", "picture": "0x5"}"#, "sides"),
         ] {
             let error = with(json);
             assert!(error.contains(named), "{json}: {error}");
@@ -262,7 +263,9 @@ mod tests {
     #[test]
     fn no_place_makes_a_picture_larger_than_allowed() {
         let whole = Settings { picture: PictureSize::WHOLE_WINDOW, ..Settings::default() };
-        assert!(is_allowed(size_in(&whole, [16_384, 16_384])));
-        assert!(is_allowed(size_in(&whole, [0, 0])));
+        for place in [[16_384, 16_384], [0, 0]] {
+            let size = size_in(&whole, place);
+            assert_eq!(allowed((size.width, size.height)), Some(size));
+        }
     }
 }

@@ -38,7 +38,7 @@ pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
         args.size.width, args.size.height, args.rounds, args.secs
     );
     let row = |case: &Case| {
-        let world = Arc::new(World::new(Arc::new(input::scene(case.scene)?)));
+        let world = Arc::new(World::new(Arc::new(input::scene(case.scene, &Default::default())?)));
         let rounds: Vec<f64> = (0..args.rounds)
             .map(|seed| nanos_per_pixel(&world, case, args, u64::from(seed)))
             .collect();

@@ -13,16 +13,23 @@ use crate::input;
 // The first turns of a run learn the batch length; they are not counted.
 const WARM_UP_SECS: f64 = 0.2;
 
-/// Rows `engine.<sampler>_samples_per_sec` and `engine.<sampler>_over_random`, the ratio round by round.
+/// Rows `engine.<sampler>_samples_per_sec` and `engine.<sampler>_over_random`, the ratio round by round; and
+/// `engine.update_share`: what bringing the scene to a batch's time takes, of the time from batch to batch.
 pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
-    let world = Arc::new(World::new(Arc::new(input::scene(args.scene())?)));
+    let world = Arc::new(World::new(Arc::new(input::scene(args.scene(), &args.choice())?)));
     let mut rates = SamplerKind::ALL.map(|_| Vec::new());
+    let mut update_shares = Vec::new();
     for round in 0..args.rounds {
         // Everybody is first as often as last: the machine's speed drifts within a round too.
         for turn in 0..SamplerKind::ALL.len() {
             let i = (turn + round as usize) % SamplerKind::ALL.len();
             let kind = SamplerKind::ALL[i];
-            rates[i].push(samples_per_sec(&world, kind, args, u64::from(round)));
+            let speed = speed(&world, kind, args, u64::from(round));
+            rates[i].push(speed.samples_per_sec);
+            if kind == SamplerKind::default() {
+                let update_secs = update_secs(&world, speed.batches_per_sec, args.secs);
+                update_shares.push(update_secs * speed.batches_per_sec);
+            }
         }
     }
     let conditions = format!(
@@ -45,6 +52,7 @@ pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
         let name = format!("engine.{}_over_random", kind.name());
         rows.push(Row::new(name, "ratio", &ratios, &conditions));
     }
+    rows.push(Row::new("engine.update_share", "of a batch's time", &update_shares, &conditions));
     Ok(rows)
 }
 
@@ -55,18 +63,40 @@ fn threads(args: &BenchArgs) -> usize {
     }
 }
 
-fn samples_per_sec(world: &Arc<World>, kind: SamplerKind, args: &BenchArgs, seed: u64) -> f64 {
+/// How fast the loop ran.
+struct Speed {
+    samples_per_sec: f64,
+    batches_per_sec: f64,
+}
+
+fn speed(world: &Arc<World>, kind: SamplerKind, args: &BenchArgs, seed: u64) -> Speed {
     let settings = Settings { surfaces: false, ..Settings::default() };
     let view = ViewSource::Camera(0);
     let tracer = CpuTracer::new(Arc::clone(world), view, settings, args.threads);
     let mut engine = Engine::new(args.size, Clock::real(), kind.build(seed), tracer);
     let mut run_for = |secs: f64| {
-        let (begin, kept) = (engine.now(), engine.counters().kept);
+        let (begin, before) = (engine.now(), engine.counters());
         while engine.now().secs_since(begin) < secs {
             engine.step().expect("the tracer's colours are finite");
         }
-        (engine.counters().kept - kept) as f64 / engine.now().secs_since(begin)
+        let (elapsed, after) = (engine.now().secs_since(begin), engine.counters());
+        Speed {
+            samples_per_sec: (after.kept - before.kept) as f64 / elapsed,
+            batches_per_sec: (after.batches - before.batches) as f64 / elapsed,
+        }
     };
     run_for(WARM_UP_SECS);
     run_for(args.secs)
+}
+
+/// Seconds that it takes to bring everything to the time of the next batch, on one thread: the mean over `secs` of the scene.
+fn update_secs(world: &World, batches_per_sec: f64, secs: f64) -> f64 {
+    let mut moment = world.moment(0.0);
+    let updates = (secs * batches_per_sec).ceil().max(1.0) as u32;
+    let clock = Clock::real();
+    let begin = clock.now();
+    for update in 1..=updates {
+        world.update_moment(f64::from(update) / batches_per_sec, &mut moment);
+    }
+    clock.now().secs_since(begin) / f64::from(updates)
 }

@@ -38,7 +38,7 @@ pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
 }
 
 fn in_a_scene(args: &BenchArgs) -> Result<Row, Failure> {
-    let world = Arc::new(World::new(Arc::new(input::scene(args.scene())?)));
+    let world = Arc::new(World::new(Arc::new(input::scene(args.scene(), &args.choice())?)));
     let rounds = (0..args.rounds).map(|seed| scene_nanos(&world, args, u64::from(seed)));
     let conditions = format!(
         "{}, {}×{}, 938 samples per batch, adaptive+reproject refreshed 60 times a second, one thread, {} rounds of {} s after \

@@ -63,3 +63,46 @@ fn a_pixel_is_told_step_by_step() {
     let told = frameless(&["trace", "sphere", "--pixel", "256,192", "--time", "0.5"]);
     assert!(told.succeeded().out.lines().count() > 3);
 }
+
+/// Two scenes, and three animations of which the first and the last move the same node.
+const CHOICES: &str = r#"{"asset": {"version": "2.0"},
+"scenes": [{"name": "day", "nodes": [0]}, {"name": "night", "nodes": [0, 1]}],
+"nodes": [{"name": "a"}, {"name": "b"}],
+"animations": [
+    {"name": "walk", "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}],
+        "samplers": [{"input": 0, "output": 1}]},
+    {"name": "nod", "channels": [{"sampler": 0, "target": {"node": 0, "path": "scale"}}],
+        "samplers": [{"input": 0, "output": 1}]},
+    {"name": "run", "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}],
+        "samplers": [{"input": 0, "output": 1}]}],
+"accessors": [{"bufferView": 0, "componentType": 5126, "type": "SCALAR", "count": 2},
+    {"bufferView": 0, "byteOffset": 8, "componentType": 5126, "type": "VEC3", "count": 2}],
+"bufferViews": [{"buffer": 0, "byteLength": 32}],
+"buffers": [{"byteLength": 32,
+    "uri": "data:application/octet-stream;base64,AAAAAAAAgD8AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA="}]}"#;
+
+#[test]
+fn scenes_and_animations_of_a_file_are_listed_and_chosen() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("choices.gltf");
+    std::fs::write(&file, CHOICES).unwrap();
+    let file = file.to_string_lossy();
+    let info = |arguments: &[&str]| frameless(&[&["info", &*file], arguments].concat());
+    let told = info(&[]).succeeded().out;
+    for line in ["0  \"day\", shown", "1  \"night\"\n", "0  \"walk\", played", "1  \"nod\"\n"] {
+        assert!(told.contains(line), "no {line} in {told}");
+    }
+    assert!(told.contains("only animation \"walk\" is played"), "{told}");
+    let told = info(&["--scene", "night", "--animation", "2"]).succeeded().out;
+    for line in ["1  \"night\", shown", "2  \"run\", played", "at 4 nodes"] {
+        assert!(told.contains(line), "no {line} in {told}");
+    }
+    assert!(info(&["--animation", "none"]).succeeded().out.contains("motion      none"));
+    assert!(info(&["--animation", "all"]).succeeded().out.contains("1 translation, 1 scale"));
+    info(&["--scene", "2"]).refused(2, "wanted scene 2");
+    info(&["--animation", "swim"]).refused(2, "wanted animation \"swim\"");
+    frameless(&["info", "sphere", "--scene", "0"]).refused(2, "no parts");
+    frameless(&["info", "sphere", "--animation", "walk"]).refused(2, "no parts");
+    let still = frameless(&["info", "sphere", "--animation", "none"]).succeeded().out;
+    assert!(still.contains("motion      none"), "{still}");
+}

@@ -12,7 +12,7 @@ pub(super) struct Accessor<'a> {
     pub(super) component: Component,
     /// Components per element: 1 (SCALAR) to 16 (MAT4).
     pub(super) width: usize,
-    pointer: String,
+    pub(super) pointer: String,
     /// Integers stand for fractions in [0, 1] or [−1, 1].
     normalized: bool,
     /// `None`: all zeros.
@@ -161,6 +161,19 @@ impl<'a> Accessor<'a> {
             return Err(Fault::at(&self.pointer, "unsigned scalars as indices", came));
         }
         self.elements(budget, |bytes| component.whole(bytes))
+    }
+
+    /// The elements as four joint numbers each.
+    pub(super) fn joints(&self, budget: &mut Budget) -> Result<Vec<[u16; 4]>, Fault> {
+        let component = self.component;
+        if self.width != 4 || !matches!(component, Component::U8 | Component::U16) {
+            let came = format!("{} × {component:?}", self.width);
+            return Err(Fault::at(&self.pointer, "VEC4 of 5121 or 5123 as joints", came));
+        }
+        let step = component.bytes();
+        let read =
+            |bytes: &[u8]| std::array::from_fn(|k| component.whole(&bytes[k * step..]) as u16);
+        self.elements(budget, read)
     }
 
     fn elements<T: Clone>(

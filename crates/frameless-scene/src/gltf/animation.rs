@@ -1,43 +1,119 @@
-//! Keyframe animation. The file's animations run together; what two of them drive, the first does.
+//! Keyframe animation: of the file's animations those that are wanted, together.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
+use std::rc::Rc;
 
 use glam::{Quat, Vec3};
 
-use crate::{Animation, Channel, Interpolation, Target, Values};
+use crate::{Animation, Channel, Contents, Interpolation, Target, Values};
 
+use super::choice::AnimationChoice;
 use super::document::Document;
 use super::error::Fault;
+use super::instances::WeightsOfNode;
 use super::json::Json;
 use super::node::{Hierarchy, unit};
 
-/// All motion of the scene's nodes.
+/// All motion of the scene's nodes; says in `contents` which animations that is.
 pub(super) fn load_animation(
     document: &mut Document<'_>,
-    hierarchy: &Hierarchy,
+    nodes: &Nodes<'_>,
+    choice: &AnimationChoice,
+    contents: &mut Contents,
 ) -> Result<Animation, Fault> {
+    let list = document.root.list("animations")?;
+    let mut parsed = Vec::new();
+    for json in &list {
+        parsed.push(parse_animation(json, document, nodes)?);
+    }
+    contents.played = played(&list, &parsed, choice, document)?;
     let mut animation = Animation::default();
     let mut driven = HashSet::new();
-    for json in document.root.list("animations")? {
-        let samplers = load_samplers(&json, document)?;
-        for channel in json.required("channels")?.elements()? {
-            let owner = json.called("animation");
-            let sampler = channel.required("sampler")?;
-            let keys = &samplers[sampler.index(samplers.len(), "samplers")?];
-            let Some(target) = parse_target(&channel, &owner, document, hierarchy)? else {
-                continue;
-            };
-            if !driven.insert(target) {
+    for &number in &contents.played {
+        let owner = list[number].called("animation");
+        for Move { keys, sampler, what } in &parsed[number] {
+            if !driven.insert(what.clone()) {
                 let what = "what an earlier animation moves already was left out";
-                document.warnings.about(what, owner);
+                document.warnings.about(what, &owner);
                 continue;
             }
-            animation.channels.extend(keys.channel(&sampler, target, &owner, document)?);
+            keys.add_channels(sampler, what, &owner, document, &mut animation.channels)?;
         }
     }
     let last_keys = animation.channels.iter().filter_map(|channel| channel.times.last());
     animation.duration_secs = last_keys.fold(0.0, |longest, &secs| longest.max(f64::from(secs)));
     Ok(animation)
+}
+
+/// The nodes that may be moved.
+pub(super) struct Nodes<'a> {
+    pub(super) hierarchy: &'a Hierarchy,
+    pub(super) weights_of: &'a WeightsOfNode,
+}
+
+/// Indices of the animations that are played.
+fn played(
+    list: &[Json<'_>],
+    parsed: &[Vec<Move<'_>>],
+    choice: &AnimationChoice,
+    document: &mut Document<'_>,
+) -> Result<Vec<usize>, Fault> {
+    Ok(match choice {
+        AnimationChoice::None => Vec::new(),
+        AnimationChoice::One(pick) => vec![pick.find(list, "animations", "animation")?],
+        AnimationChoice::Fitting if compete(parsed) => {
+            let first = list[0].called("animation");
+            let count = list.len();
+            document
+                .warnings
+                .add(format!("{count} animations move the same things: only {first} is played"));
+            vec![0]
+        }
+        AnimationChoice::Fitting | AnimationChoice::All => (0..list.len()).collect(),
+    })
+}
+
+/// Whether two animations move the same thing.
+fn compete(parsed: &[Vec<Move<'_>>]) -> bool {
+    let mut owner = HashMap::new();
+    let all = parsed.iter().enumerate().flat_map(|(i, moves)| moves.iter().map(move |m| (i, m)));
+    all.into_iter().any(|(index, one)| *owner.entry(&one.what).or_insert(index) != index)
+}
+
+/// A channel of the file, of something in the scene.
+struct Move<'a> {
+    keys: Rc<Keys>,
+    sampler: Json<'a>,
+    what: What,
+}
+
+/// What a channel of the file moves.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+enum What {
+    /// One property of one node.
+    Node(Target),
+    /// All weights of one node's mesh.
+    Weights(Range<u32>),
+}
+
+fn parse_animation<'a>(
+    json: &Json<'a>,
+    document: &mut Document<'_>,
+    nodes: &Nodes<'_>,
+) -> Result<Vec<Move<'a>>, Fault> {
+    let samplers = load_samplers(json, document)?;
+    let owner = json.called("animation");
+    let mut moves = Vec::new();
+    for channel in json.required("channels")?.elements()? {
+        let sampler = channel.required("sampler")?;
+        let keys = samplers[sampler.index(samplers.len(), "samplers")?].clone();
+        if let Some(what) = parse_target(&channel, &owner, document, nodes)? {
+            keys.check_count(&sampler, &what, document)?;
+            moves.push(Move { keys, sampler, what });
+        }
+    }
+    Ok(moves)
 }
 
 /// When, and the accessor that says what.
@@ -48,9 +124,12 @@ struct Keys {
     interpolation: Interpolation,
 }
 
-fn load_samplers(animation: &Json<'_>, document: &mut Document<'_>) -> Result<Vec<Keys>, Fault> {
+fn load_samplers(
+    animation: &Json<'_>,
+    document: &mut Document<'_>,
+) -> Result<Vec<Rc<Keys>>, Fault> {
     let samplers = animation.required("samplers")?.elements()?;
-    samplers.iter().map(|json| load_keys(json, document)).collect()
+    samplers.iter().map(|json| load_keys(json, document).map(Rc::new)).collect()
 }
 
 fn load_keys(json: &Json<'_>, document: &mut Document<'_>) -> Result<Keys, Fault> {
@@ -76,21 +155,26 @@ fn parse_target(
     channel: &Json<'_>,
     owner: &str,
     document: &mut Document<'_>,
-    hierarchy: &Hierarchy,
-) -> Result<Option<Target>, Fault> {
+    nodes: &Nodes<'_>,
+) -> Result<Option<What>, Fault> {
     let target = channel.required("target")?;
     let path = target.required("path")?;
-    let node = match target.field("node")? {
-        Some(node) => hierarchy.index_of[node.index(hierarchy.index_of.len(), "nodes")?],
+    let index_of = &nodes.hierarchy.index_of;
+    let file_node = match target.field("node")? {
+        Some(node) => Some(node.index(index_of.len(), "nodes")?),
         None => None,
     };
+    let node = file_node.and_then(|node| index_of[node]);
     let make_target: fn(u32) -> Target = match path.text()? {
         "translation" => Target::Translation,
         "rotation" => Target::Rotation,
         "scale" => Target::Scale,
         "weights" => {
-            document.warnings.about("morph weights are not animated", owner);
-            return Ok(None);
+            let weights = file_node.and_then(|node| nodes.weights_of[node].clone());
+            if node.is_some() && weights.is_none() {
+                document.warnings.about("weights without morph targets are not animated", owner);
+            }
+            return Ok(weights.map(What::Weights));
         }
         "pointer" => {
             document.warnings.about("animated pointers are left out", owner);
@@ -98,43 +182,81 @@ fn parse_target(
         }
         _ => return Err(path.fault("translation, rotation, scale or weights")),
     };
-    Ok(node.map(make_target))
+    Ok(node.map(|node| What::Node(make_target(node))))
 }
 
 impl Keys {
-    /// The channel without keys that are infinite, NaN, before time 0 or not after the one before; `None` if none is left.
-    fn channel(
+    /// Numbers per key: in-tangent, value, out-tangent or only that.
+    fn per_key(&self) -> usize {
+        if self.interpolation == Interpolation::CubicSpline { 3 } else { 1 }
+    }
+
+    fn check_count(
         &self,
         sampler: &Json<'_>,
-        target: Target,
+        what: &What,
+        document: &Document<'_>,
+    ) -> Result<(), Fault> {
+        let per_key = match what {
+            What::Node(_) => self.per_key(),
+            What::Weights(weights) => self.per_key() * weights.len(),
+        };
+        let came = document.accessors[self.output].count;
+        if self.times.len().checked_mul(per_key) == Some(came) {
+            return Ok(());
+        }
+        let wanted = format!("{per_key} values for each of {} keys", self.times.len());
+        Err(Fault::at(sampler.pointer(), wanted, came))
+    }
+
+    /// Channels without keys that are infinite, NaN, before time 0 or not after the one before; none if no key is left.
+    fn add_channels(
+        &self,
+        sampler: &Json<'_>,
+        what: &What,
         owner: &str,
         document: &mut Document<'_>,
-    ) -> Result<Option<Channel>, Fault> {
-        let per_key = if self.interpolation == Interpolation::CubicSpline { 3 } else { 1 };
-        let output = &document.accessors[self.output];
-        let wanted = self.times.len().checked_mul(per_key);
-        if wanted != Some(output.count) {
-            let wanted = format!("{per_key} values for each of {} keys", self.times.len());
-            return Err(Fault::at(sampler.pointer(), wanted, output.count));
-        }
-        let (kept, times, values) = match target {
-            Target::Rotation(_) => {
-                let mut values = output.numbers::<4>(&mut document.budget)?;
-                let usable = |key: &mut [[f32; 4]]| normalize_key(key) && is_finite(key);
-                let (kept, times) = self.keep(&mut values, per_key, usable);
-                (kept, times, Values::Quat(values.into_iter().map(Quat::from_array).collect()))
+        channels: &mut Vec<Channel>,
+    ) -> Result<(), Fault> {
+        let Document { accessors, budget, warnings, .. } = document;
+        let (output, per_key) = (&accessors[self.output], self.per_key());
+        let mut add = |target: Target, kept: usize, times: Vec<f32>, values: Values| {
+            if kept < self.times.len() {
+                warnings.about("keys without a usable time or value were left out", owner);
             }
-            _ => {
-                let mut values = output.numbers::<3>(&mut document.budget)?;
-                let (kept, times) = self.keep(&mut values, per_key, |key| is_finite(key));
-                (kept, times, Values::Vec3(values.into_iter().map(Vec3::from_array).collect()))
+            if kept > 0 {
+                let interpolation = self.interpolation;
+                channels.push(Channel { target, times, values, interpolation });
             }
         };
-        if kept < self.times.len() {
-            document.warnings.about("keys without a usable time or value were left out", owner);
+        match what {
+            What::Node(target @ Target::Rotation(_)) => {
+                let mut values = output.numbers::<4>(budget)?;
+                let usable = |key: &mut [[f32; 4]]| normalize_key(key) && is_finite(key);
+                let (kept, times) = self.keep(&mut values, per_key, usable);
+                let values = values.into_iter().map(Quat::from_array).collect();
+                add(*target, kept, times, Values::Quat(values));
+            }
+            What::Node(target) => {
+                let mut values = output.numbers::<3>(budget)?;
+                let (kept, times) = self.keep(&mut values, per_key, |key| is_finite(key));
+                let values = values.into_iter().map(Vec3::from_array).collect();
+                add(*target, kept, times, Values::Vec3(values));
+            }
+            What::Weights(weights) => {
+                let all = output.numbers::<1>(budget)?;
+                // Every weight becomes a channel of its own, with the times of all.
+                budget.allocate(sampler.pointer(), all.len(), 2 * size_of::<f32>())?;
+                for (place, weight) in weights.clone().enumerate() {
+                    let mut values: Vec<[f32; 1]> =
+                        all.iter().skip(place).step_by(weights.len()).copied().collect();
+                    let (kept, times) = self.keep(&mut values, per_key, |key| is_finite(key));
+                    let values = values.into_iter().flatten().collect();
+                    add(Target::MorphWeight(weight), kept, times, Values::Scalar(values));
+                }
+            }
         }
-        let interpolation = self.interpolation;
-        Ok((kept > 0).then_some(Channel { target, times, values, interpolation }))
+        Ok(())
     }
 
     /// Drops unusable keys from `values`; returns how many are left, and their times.

@@ -1,6 +1,10 @@
 //! What a primitive's vertices carry: read from accessors, with every number made finite.
 
+use std::collections::BTreeMap;
+
 use glam::{Vec2, Vec3, Vec4};
+
+use crate::Influences;
 
 use super::accessor::Accessor;
 use super::error::{Fault, quoted};
@@ -12,12 +16,24 @@ use super::warnings::Warnings;
 const LARGEST_COORDINATE: f32 = 1e18;
 
 /// Accessors of the attributes that are read. Primitives with equal ones share their vertices.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct Attributes {
     pub(super) position: Option<usize>,
     pub(super) normal: Option<usize>,
     pub(super) uvs: [Option<usize>; 2],
     pub(super) color: Option<usize>,
+    /// JOINTS_n and WEIGHTS_n, in the order of n.
+    pub(super) influences: Vec<[usize; 2]>,
+    /// What the primitive's morph targets displace.
+    pub(super) targets: Vec<TargetAttributes>,
+}
+
+/// Accessors of a morph target.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct TargetAttributes {
+    position: Option<usize>,
+    normal: Option<usize>,
+    color: Option<usize>,
 }
 
 impl Attributes {
@@ -27,7 +43,8 @@ impl Attributes {
         warnings: &mut Warnings,
     ) -> Result<Attributes, Fault> {
         let mut attributes = Attributes::default();
-        let list = primitive.required("attributes")?.members()?;
+        let mut list = primitive.required("attributes")?.members()?;
+        let mut influences = BTreeMap::new();
         for (semantic, json) in &list {
             let accessor = json.index(accessors.len(), "accessors")?;
             match *semantic {
@@ -37,8 +54,24 @@ impl Attributes {
                 "TEXCOORD_1" => attributes.uvs[1] = Some(accessor),
                 "COLOR_0" => attributes.color = Some(accessor),
                 other if is_silently_ignored(other) => {}
-                other => warnings.about("vertex attributes ignored", quoted(other)),
+                other => match influence(other) {
+                    Some((number, part)) => {
+                        influences.entry(number).or_insert([None; 2])[part] = Some(accessor);
+                    }
+                    None => warnings.about("vertex attributes ignored", quoted(other)),
+                },
             }
+        }
+        for set in influences.into_values() {
+            match set {
+                [Some(joints), Some(weights)] => attributes.influences.push([joints, weights]),
+                _ => warnings.add("joints without weights, or weights without joints, are ignored"),
+            }
+        }
+        for target in primitive.list("targets")? {
+            let members = target.members()?;
+            attributes.targets.push(TargetAttributes::parse(&members, accessors, warnings)?);
+            list.extend(members);
         }
         if let Some(position) = attributes.position {
             refuse_other_counts(&list, accessors, accessors[position].count)?;
@@ -47,11 +80,40 @@ impl Attributes {
     }
 }
 
-/// Tangents say nothing without normal maps, joints and weights nothing without skins, both of which are warned about where
-/// they are used; names that begin with an underscore belong to applications.
+impl TargetAttributes {
+    fn parse(
+        members: &[(&str, Json<'_>)],
+        accessors: &[Accessor<'_>],
+        warnings: &mut Warnings,
+    ) -> Result<TargetAttributes, Fault> {
+        let mut target = TargetAttributes::default();
+        for (semantic, json) in members {
+            let accessor = json.index(accessors.len(), "accessors")?;
+            match *semantic {
+                "POSITION" => target.position = Some(accessor),
+                "NORMAL" => target.normal = Some(accessor),
+                "COLOR_0" => target.color = Some(accessor),
+                other if is_silently_ignored(other) => {}
+                other => warnings.about("morphed vertex attributes ignored", quoted(other)),
+            }
+        }
+        Ok(target)
+    }
+}
+
+/// Tangents say nothing without normal maps, which are warned about where they are used; names that begin with an underscore
+/// belong to applications.
 fn is_silently_ignored(semantic: &str) -> bool {
-    let numbered = ["JOINTS_", "WEIGHTS_"].iter().any(|prefix| semantic.starts_with(prefix));
-    numbered || semantic == "TANGENT" || semantic.starts_with('_')
+    semantic == "TANGENT" || semantic.starts_with('_')
+}
+
+/// The n of JOINTS_n (part 0) or WEIGHTS_n (part 1).
+fn influence(semantic: &str) -> Option<(u32, usize)> {
+    let (part, number) = match semantic.strip_prefix("JOINTS_") {
+        Some(number) => (0, number),
+        None => (1, semantic.strip_prefix("WEIGHTS_")?),
+    };
+    Some((number.parse().ok()?, part))
 }
 
 fn refuse_other_counts(
@@ -78,8 +140,48 @@ pub(super) struct Vertices {
     pub(super) normals: Option<Vec<Vec3>>,
     pub(super) uvs: [Option<Vec<Vec2>>; 2],
     pub(super) colors: Option<Vec<Vec4>>,
+    /// As in the file: weights may be anything.
+    pub(super) influences: Vec<Influences>,
+    /// Finite.
+    pub(super) targets: Vec<TargetVertices>,
     /// Vertices whose position was infinite or NaN (and is 0 now), ascending.
     pub(super) nowhere: Vec<u32>,
+}
+
+/// Displacements; arrays are as long as the vertices.
+#[derive(Debug, Default)]
+pub(super) struct TargetVertices {
+    pub(super) positions: Option<Vec<Vec3>>,
+    pub(super) normals: Option<Vec<Vec3>>,
+    pub(super) colors: Option<Vec<Vec4>>,
+}
+
+impl TargetVertices {
+    fn read(
+        attributes: &TargetAttributes,
+        accessors: &[Accessor<'_>],
+        mesh: &Json<'_>,
+        budget: &mut Budget,
+        warnings: &mut Warnings,
+    ) -> Result<TargetVertices, Fault> {
+        let mut vectors_of = |accessor: Option<usize>| -> Result<Option<Vec<Vec3>>, Fault> {
+            let Some(accessor) = accessor else { return Ok(None) };
+            let mut read = vectors(accessors[accessor].numbers::<3>(budget)?);
+            let fine = |v: &Vec3| v.is_finite();
+            settle(&mut read, fine, Vec3::ZERO, "displacements", mesh, warnings);
+            Ok(Some(read))
+        };
+        let (positions, normals) =
+            (vectors_of(attributes.position)?, vectors_of(attributes.normal)?);
+        let mut colors = match attributes.color {
+            Some(accessor) => Some(read_colors(&accessors[accessor], 0.0, budget)?),
+            None => None,
+        };
+        if let Some(colors) = &mut colors {
+            settle(colors, |c| c.is_finite(), Vec4::ZERO, "displacements", mesh, warnings);
+        }
+        Ok(TargetVertices { positions, normals, colors })
+    }
 }
 
 impl Vertices {
@@ -114,10 +216,19 @@ impl Vertices {
             *uvs = Some(read);
         }
         if let Some(accessor) = attributes.color {
-            let mut colors = read_colors(&accessors[accessor], budget)?;
+            let mut colors = read_colors(&accessors[accessor], 1.0, budget)?;
             settle(&mut colors, |c| c.is_finite(), Vec4::ONE, "vertex colours", mesh, warnings);
             colors.iter_mut().for_each(|color| *color = color.clamp(Vec4::ZERO, Vec4::ONE));
             vertices.colors = Some(colors);
+        }
+        for [joints, weights] in &attributes.influences {
+            let joints = accessors[*joints].joints(budget)?;
+            let weights = accessors[*weights].numbers::<4>(budget)?;
+            vertices.influences.push(Influences { joints, weights });
+        }
+        for target in &attributes.targets {
+            let target = TargetVertices::read(target, accessors, mesh, budget, warnings)?;
+            vertices.targets.push(target);
         }
         Ok(vertices)
     }
@@ -136,11 +247,15 @@ impl Vertices {
     }
 }
 
-/// Linear RGB or RGBA.
-fn read_colors(accessor: &Accessor<'_>, budget: &mut Budget) -> Result<Vec<Vec4>, Fault> {
+/// Linear RGB, which gets `alpha`, or RGBA.
+fn read_colors(
+    accessor: &Accessor<'_>,
+    alpha: f32,
+    budget: &mut Budget,
+) -> Result<Vec<Vec4>, Fault> {
     if accessor.width == 3 {
         let rgb = accessor.numbers::<3>(budget)?;
-        return Ok(rgb.into_iter().map(|[r, g, b]| Vec4::new(r, g, b, 1.0)).collect());
+        return Ok(rgb.into_iter().map(|[r, g, b]| Vec4::new(r, g, b, alpha)).collect());
     }
     Ok(vectors(accessor.numbers::<4>(budget)?))
 }

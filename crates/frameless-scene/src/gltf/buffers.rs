@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::path::Path;
 
+use super::compressed;
 use super::error::Fault;
 use super::json::Json;
 use super::limits::Budget;
@@ -50,6 +51,7 @@ fn load_buffer<'a>(
     let length = json.required("byteLength")?;
     let wanted = length.unsigned()?;
     let data: Cow<'a, [u8]> = match json.field("uri")? {
+        None if bin.is_none() && compressed::is_fallback(json)? => return Ok(Cow::Borrowed(&[])),
         Some(uri) => Uri::parse(&uri)?.read(uri.pointer(), folder, budget)?.into(),
         None => bin.map(Cow::Borrowed).ok_or_else(|| {
             json.fault("a uri, or the binary chunk of a GLB for the first buffer")
@@ -72,20 +74,32 @@ fn cut(data: Cow<'_, [u8]>, length: usize) -> Cow<'_, [u8]> {
     }
 }
 
-/// All buffer views, each within its buffer.
+/// All buffer views, each within its buffer, or as it was `decoded`.
 pub(super) fn parse_views<'b>(
     root: &Json<'_>,
     buffers: &'b [Cow<'_, [u8]>],
+    decoded: &'b [Option<Vec<u8>>],
 ) -> Result<Vec<View<'b>>, Fault> {
-    root.list("bufferViews")?.iter().map(|json| parse_view(json, buffers)).collect()
+    let views = root.list("bufferViews")?;
+    let views = views.iter().zip(decoded);
+    views.map(|(json, decoded)| parse_view(json, buffers, decoded.as_deref())).collect()
 }
 
-fn parse_view<'b>(json: &Json<'_>, buffers: &'b [Cow<'_, [u8]>]) -> Result<View<'b>, Fault> {
+/// A view of a buffer, or of what has been decoded in its place.
+fn parse_view<'b>(
+    json: &Json<'_>,
+    buffers: &'b [Cow<'_, [u8]>],
+    decoded: Option<&'b [u8]>,
+) -> Result<View<'b>, Fault> {
     /// glTF 2.0 §5.11.4.
     const LARGEST_STRIDE: usize = 252;
     let buffer = &buffers[json.required("buffer")?.index(buffers.len(), "buffers")?];
     let offset = json.unsigned_or("byteOffset", 0)?;
     let length = json.required("byteLength")?;
+    let (buffer, offset) = match decoded {
+        Some(decoded) => (decoded, 0),
+        None => (&buffer[..], offset),
+    };
     let bytes = slice(buffer, offset, length.unsigned()?).ok_or_else(|| {
         length.fault(format!(
             "a view within its buffer of {} bytes, from byte {offset}",

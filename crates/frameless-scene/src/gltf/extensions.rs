@@ -9,7 +9,9 @@ use super::json::Json;
 use super::warnings::Warnings;
 
 /// Extensions that are read. What of them is not drawn is warned about where it occurs.
-const SUPPORTED: [&str; 5] = [
+const SUPPORTED: [&str; 7] = [
+    "EXT_mesh_gpu_instancing",
+    super::compressed::NAME,
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",

@@ -3,36 +3,40 @@
 use std::fs::File;
 use std::path::Path;
 
-use crate::{Geometry, Instance, Material, Scene, Target, Value};
+use crate::{Contents, Geometry, Material, Scene, Target, Value};
 
 use super::accessor::parse_accessors;
-use super::animation::load_animation;
+use super::animation::{Nodes, load_animation};
 use super::buffers::{load_buffers, parse_views};
 use super::camera::load_cameras;
+use super::choice::Choice;
+use super::compressed::decode_views;
 use super::container::Container;
 use super::defaults::{add_camera, add_light};
 use super::document::Document;
 use super::error::{Fault, LoadError, Place, Problem};
 use super::extensions::check_extensions;
+use super::instances::place_instances;
 use super::json::{Json, parse};
 use super::light::load_lights;
 use super::limits::{Budget, Limits, within};
 use super::material::load_materials;
 use super::mesh::load_meshes;
 use super::node::{Hierarchy, load_nodes, node_called};
+use super::skin::load_skins;
 use super::texture::Textures;
 use super::uri::read_file;
 use super::warnings::Warnings;
 
 /// Loads a scene from a `.glb` or `.gltf` file (told apart by content); files that it names are looked for in its folder.
 ///
-/// A file with several scenes shows its default one, else its first; see [`load_scene`].
+/// A file with several scenes shows its default one, else its first; see [`load_chosen`].
 pub fn load(path: &Path, limits: &Limits) -> Result<Scene, LoadError> {
-    load_scene(path, None, limits)
+    load_chosen(path, &Choice::default(), limits)
 }
 
-/// Like [`load`], but shows scene number `scene` of the file, if that is given.
-pub fn load_scene(path: &Path, scene: Option<usize>, limits: &Limits) -> Result<Scene, LoadError> {
+/// Like [`load`], but shows the scene and plays the animations that are chosen.
+pub fn load_chosen(path: &Path, choice: &Choice, limits: &Limits) -> Result<Scene, LoadError> {
     let shown = path.display().to_string();
     let bytes = read(path, limits).map_err(|fault| fault.in_file(&shown))?;
     let folder = match path.parent() {
@@ -40,7 +44,7 @@ pub fn load_scene(path: &Path, scene: Option<usize>, limits: &Limits) -> Result<
         _ => Path::new("."),
     };
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
-    from_bytes(&name.unwrap_or_default(), &bytes, Some(folder), scene, limits)
+    from_bytes(&name.unwrap_or_default(), &bytes, Some(folder), choice, limits)
         .map_err(|fault| fault.in_file(&shown))
 }
 
@@ -52,7 +56,7 @@ pub fn load_bytes(
     folder: Option<&Path>,
     limits: &Limits,
 ) -> Result<Scene, LoadError> {
-    from_bytes(name, bytes, folder, None, limits).map_err(|fault| fault.in_file(name))
+    from_bytes(name, bytes, folder, &Choice::default(), limits).map_err(|fault| fault.in_file(name))
 }
 
 fn read(path: &Path, limits: &Limits) -> Result<Vec<u8>, Fault> {
@@ -71,7 +75,7 @@ fn from_bytes(
     name: &str,
     bytes: &[u8],
     folder: Option<&Path>,
-    chosen_scene: Option<usize>,
+    choice: &Choice,
     limits: &Limits,
 ) -> Result<Scene, Fault> {
     within(bytes.len() as u64, limits.file_bytes, "bytes of file", "")?;
@@ -83,10 +87,11 @@ fn from_bytes(
     check_version(&root)?;
     check_extensions(&root, &value, &mut warnings)?;
     let buffers = load_buffers(&root, container.bin, folder, &mut budget, &mut warnings)?;
-    let views = parse_views(&root, &buffers)?;
+    let decoded = decode_views(&root, &buffers, &mut budget)?;
+    let views = parse_views(&root, &buffers, &decoded)?;
     let accessors = parse_accessors(&root, &views)?;
     let mut document = Document { root, views, accessors, folder, budget, warnings };
-    let mut scene = build(&mut document, chosen_scene)?;
+    let mut scene = build(&mut document, choice)?;
     name.clone_into(&mut scene.name);
     finish(&mut scene, document.warnings);
     Ok(scene)
@@ -106,21 +111,23 @@ fn refuse_other_than_2(version: &Json<'_>) -> Result<(), Fault> {
     }
 }
 
-fn build(document: &mut Document<'_>, chosen_scene: Option<usize>) -> Result<Scene, Fault> {
+fn build(document: &mut Document<'_>, choice: &Choice) -> Result<Scene, Fault> {
     let limits = document.budget.limits.clone();
     let root = document.root.clone();
-    let hierarchy = load_nodes(&root, chosen_scene, &limits, &mut document.warnings)?;
+    let mut hierarchy = load_nodes(&root, choice.scene.as_ref(), &limits, &mut document.warnings)?;
     let mut textures = Textures::parse(&root, document.views.len())?;
     let mut scene =
         Scene { materials: load_materials(document, &mut textures)?, ..Scene::default() };
     (scene.textures, scene.images) = (textures.textures, textures.images);
     scene.geometries = load_meshes(document, &scene.materials)?;
     add_default_material(&mut scene);
-    place_instances(&mut scene, document, &hierarchy)?;
+    let skins = load_skins(document, &hierarchy)?;
+    let weights_of = place_instances(&mut scene, document, &mut hierarchy, skins)?;
     scene.cameras = load_cameras(&root, &hierarchy)?;
     scene.lights = load_lights(&root, &hierarchy)?;
-    check_skins(document, &hierarchy)?;
-    scene.animation = load_animation(document, &hierarchy)?;
+    scene.contents = load_contents(&root, &hierarchy)?;
+    let nodes = Nodes { hierarchy: &hierarchy, weights_of: &weights_of };
+    scene.animation = load_animation(document, &nodes, &choice.animation, &mut scene.contents)?;
     scene.nodes.clone_from(&hierarchy.nodes);
     set_still_pose(&mut scene);
     refuse_infinite_places(&scene, &hierarchy)?;
@@ -139,64 +146,13 @@ fn add_default_material(scene: &mut Scene) {
     }
 }
 
-/// One instance per node with a mesh that has triangles, in the order of the file's nodes. Meshes at no node are dropped.
-fn place_instances(
-    scene: &mut Scene,
-    document: &Document<'_>,
-    hierarchy: &Hierarchy,
-) -> Result<(), Fault> {
-    let file_meshes = std::mem::take(&mut scene.geometries);
-    let is_empty = |mesh: usize| match &file_meshes[mesh] {
-        Geometry::Mesh(mesh) => mesh.triangles.is_empty(),
-        Geometry::Sphere { .. } => false,
+/// Names of what can be chosen.
+fn load_contents(root: &Json<'_>, hierarchy: &Hierarchy) -> Result<Contents, Fault> {
+    let names = |key: &str| -> Result<Vec<String>, Fault> {
+        Ok(root.list(key)?.iter().map(Json::name).collect())
     };
-    let mut geometry_of = vec![None; file_meshes.len()];
-    let mut geometry_count = 0;
-    for (file_index, node) in document.root.list("nodes")?.iter().enumerate() {
-        let Some(reference) = node.field("mesh")? else { continue };
-        let mesh = reference.index(file_meshes.len(), "meshes")?;
-        let Some(index) = hierarchy.index_of[file_index].filter(|_| !is_empty(mesh)) else {
-            continue;
-        };
-        let geometry = *geometry_of[mesh].get_or_insert_with(|| {
-            geometry_count += 1;
-            geometry_count - 1
-        });
-        scene.instances.push(Instance { node: index, geometry });
-        let limit = document.budget.limits.instances;
-        within(scene.instances.len() as u64, limit, "instances", node.pointer())?;
-    }
-    let mut used: Vec<_> = geometry_of.into_iter().zip(file_meshes).collect();
-    used.retain(|(geometry, _)| geometry.is_some());
-    used.sort_by_key(|(geometry, _)| *geometry);
-    scene.geometries = used.into_iter().map(|(_, mesh)| mesh).collect();
-    Ok(())
-}
-
-/// Skinned meshes are drawn as they are modelled; what the skins refer to has to exist nevertheless.
-fn check_skins(document: &mut Document<'_>, hierarchy: &Hierarchy) -> Result<(), Fault> {
-    let nodes = document.root.list("nodes")?;
-    let skins = document.root.list("skins")?;
-    for skin in &skins {
-        for joint in skin.required("joints")?.elements()? {
-            joint.index(nodes.len(), "nodes")?;
-        }
-        if let Some(skeleton) = skin.field("skeleton")? {
-            skeleton.index(nodes.len(), "nodes")?;
-        }
-        if let Some(matrices) = skin.field("inverseBindMatrices")? {
-            matrices.index(document.accessors.len(), "accessors")?;
-        }
-    }
-    for (file_index, node) in nodes.iter().enumerate() {
-        let Some(skin) = node.field("skin")? else { continue };
-        let skin = &skins[skin.index(skins.len(), "skins")?];
-        if hierarchy.index_of[file_index].is_some() {
-            let what = "skins are not drawn: the mesh keeps its rest pose";
-            document.warnings.about(what, skin.called("skin"));
-        }
-    }
-    Ok(())
+    let (scenes, animations) = (names("scenes")?, names("animations")?);
+    Ok(Contents { scenes, shown_scene: hierarchy.scene, animations, played: Vec::new() })
 }
 
 /// An animation whose only keys are at time 0 has no length and moves nothing: it is a pose.
@@ -210,6 +166,7 @@ fn set_still_pose(scene: &mut Scene) {
             (Target::Translation(i), Value::Vec3(v)) => nodes[i as usize].rest.translation = v,
             (Target::Rotation(i), Value::Quat(q)) => nodes[i as usize].rest.rotation = q,
             (Target::Scale(i), Value::Vec3(v)) => nodes[i as usize].rest.scale = v,
+            (Target::MorphWeight(i), Value::Scalar(w)) => scene.morph_weights[i as usize] = w,
             (target, value) => unreachable!("a glTF channel gives {target:?} no {value:?}"),
         }
     }

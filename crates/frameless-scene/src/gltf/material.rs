@@ -38,7 +38,7 @@ fn load_material(
     }
     if json.extension("KHR_materials_unlit")?.is_some() {
         document.warnings.about("unlit materials are drawn lit and matte", &*owner);
-        (material.metallic, material.roughness) = (0.0, 1.0);
+        (material.metallic, material.roughness, material.specular) = (0.0, 1.0, 0.0);
     }
     warn_of_alpha(json, &owner, document)?;
     for (key, what) in [

@@ -4,11 +4,12 @@ use std::collections::HashMap;
 
 use glam::{Vec2, Vec3, Vec4};
 
-use crate::{Geometry, Material, Mesh};
+use crate::{Geometry, Material, Mesh, MorphTarget};
 
 use super::attributes::{Attributes, Vertices};
 use super::document::Document;
 use super::error::Fault;
+use super::influences::{append_influences, settle_influences};
 use super::json::Json;
 use super::normals::{flatten, repair};
 use super::topology::Topology;
@@ -32,6 +33,7 @@ fn load_mesh(
     let primitives = json.required("primitives")?.elements()?;
     let primitives = primitives.iter().map(|json| Primitive::parse(json, document, materials));
     let primitives = primitives.collect::<Result<Vec<_>, Fault>>()?;
+    refuse_other_target_counts(&primitives)?;
     let shaded_smoothly = primitives.iter().any(|primitive| primitive.attributes.normal.is_some());
     let mut joiner =
         Joiner { json, shaded_smoothly, mesh: Mesh::default(), first_vertex: HashMap::new() };
@@ -41,7 +43,36 @@ fn load_mesh(
             joiner.add(primitive, document)?;
         }
     }
-    Ok(Geometry::Mesh(joiner.mesh))
+    let mut mesh = joiner.mesh;
+    settle_influences(&mut mesh, json, document);
+    drop_useless_displacements(&mut mesh);
+    Ok(Geometry::Mesh(mesh))
+}
+
+/// All primitives of a mesh have the same morph targets (glTF 2.0 §3.7.2.2).
+fn refuse_other_target_counts(primitives: &[Primitive<'_>]) -> Result<(), Fault> {
+    let Some(first) = primitives.first() else { return Ok(()) };
+    let wanted = first.attributes.targets.len();
+    for primitive in primitives {
+        let came = primitive.attributes.targets.len();
+        if came != wanted {
+            let wanted = format!("{wanted} morph targets, as the mesh's first primitive has");
+            return Err(Fault::at(primitive.json.pointer(), wanted, came));
+        }
+    }
+    Ok(())
+}
+
+/// Displacements of what the mesh does not have.
+fn drop_useless_displacements(mesh: &mut Mesh) {
+    for target in &mut mesh.targets {
+        if mesh.normals.is_empty() {
+            target.normals.clear();
+        }
+        if mesh.colors.is_empty() {
+            target.colors.clear();
+        }
+    }
 }
 
 /// A primitive whose references are known to lead somewhere.
@@ -55,7 +86,6 @@ struct Primitive<'a> {
     material: Option<usize>,
     /// What triangles store.
     material_slot: u32,
-    is_morphed: bool,
 }
 
 impl<'a> Primitive<'a> {
@@ -74,12 +104,6 @@ impl<'a> Primitive<'a> {
             Some(material) => Some(material.index(materials.len(), "materials")?),
             None => None,
         };
-        let targets = json.list("targets")?;
-        for (_, target) in
-            targets.iter().map(Json::members).collect::<Result<Vec<_>, _>>()?.concat()
-        {
-            target.index(accessors, "accessors")?;
-        }
         Ok(Primitive {
             json: json.clone(),
             attributes,
@@ -87,7 +111,6 @@ impl<'a> Primitive<'a> {
             topology: Topology::parse(json)?,
             material,
             material_slot: material.unwrap_or(materials.len()) as u32,
-            is_morphed: !targets.is_empty(),
         })
     }
 }
@@ -104,9 +127,6 @@ fn warn_of_what_is_left_out(
     }
     if primitive.attributes.position.is_none() {
         warn("primitives without POSITION are not drawn");
-    }
-    if primitive.is_morphed {
-        warn("morph targets are not drawn: the mesh keeps its rest shape");
     }
     let texture = primitive.material.and_then(|material| materials[material].base_color_texture);
     if texture.is_some_and(|texture| primitive.attributes.uvs[texture.uv_set as usize].is_none()) {
@@ -143,7 +163,7 @@ impl Joiner<'_> {
             let mut vertices = self.read_vertices(&primitive.attributes, document)?;
             self.repair_normals(&mut vertices, &triangles, document);
             let appended = self.append_vertices(vertices);
-            self.first_vertex.insert(primitive.attributes, appended);
+            self.first_vertex.insert(primitive.attributes.clone(), appended);
         }
         let (first, nowhere) = self.first_vertex[&primitive.attributes].clone();
         self.append_triangles(primitive, &triangles, first, &nowhere);
@@ -183,6 +203,13 @@ impl Joiner<'_> {
             extend(uvs, more, Vec2::ZERO, first, all);
         }
         extend(&mut mesh.colors, vertices.colors, Vec4::ONE, first, all);
+        append_influences(&mut mesh.influences, vertices.influences, first, all);
+        mesh.targets.resize_with(vertices.targets.len(), MorphTarget::default);
+        for (target, more) in mesh.targets.iter_mut().zip(vertices.targets) {
+            extend(&mut target.positions, more.positions, Vec3::ZERO, first, all);
+            extend(&mut target.normals, more.normals, Vec3::ZERO, first, all);
+            extend(&mut target.colors, more.colors, Vec4::ZERO, first, all);
+        }
         (first as u32, vertices.nowhere)
     }
 
@@ -208,7 +235,13 @@ impl Joiner<'_> {
 const BYTES_PER_VERTEX: usize = 12 + 12 + 2 * 8 + 16;
 
 /// Appends `more` to `values` so that it is `all` long, unless it stays empty; vertices without a value get `filler`.
-fn extend<T: Copy>(values: &mut Vec<T>, more: Option<Vec<T>>, filler: T, first: usize, all: usize) {
+pub(super) fn extend<T: Copy>(
+    values: &mut Vec<T>,
+    more: Option<Vec<T>>,
+    filler: T,
+    first: usize,
+    all: usize,
+) {
     match more {
         Some(more) => {
             values.resize(first, filler);

@@ -7,24 +7,29 @@
 //!
 //! | read | drawn otherwise, with a warning | ignored with a warning | refused |
 //! |---|---|---|---|
-//! | `.glb`, `.gltf`, `data:` URIs, files in its folder | images that cannot be decoded: a checker | GLB chunks of other types | other versions than 2.x, required extensions that are unknown |
-//! | triangles, strips, fans; indexed or not; normalised, quantised, sparse | skins, morph targets: rest shape | points, lines | indices and references that lead nowhere |
-//! | nodes with TRS or matrix, the default scene | sheared matrices: without shear | other scenes | loops, two parents |
+//! | `.glb`, `.gltf`, `data:` URIs, files in its folder, EXT_meshopt_compression | images that cannot be decoded: a checker | GLB chunks of other types | other versions than 2.x, required extensions that are unknown |
+//! | triangles, strips, fans; indexed or not; normalised, quantised, sparse | joint weights that do not sum to 1: scaled; skins with joints elsewhere: rest shape | points, lines | indices and references that lead nowhere |
+//! | nodes with TRS or matrix, one scene, EXT_mesh_gpu_instancing | sheared matrices: without shear | other scenes | loops, two parents |
 //! | base colour, metallic, roughness, emissive (KHR_materials_emissive_strength), COLOR_0, TEXCOORD_0 and 1, EXT_texture_webp | metallic-roughness and emissive textures: their mean; BLEND, MASK: opaque; unlit: lit | normal and occlusion textures, texture transforms, other extensions | paths out of the folder |
 //! | cameras, KHR_lights_punctual | none in the file: added, with a note | | angles out of range |
-//! | TRS animation, all interpolations, all animations at once | unusable keys: without them | weights, pointers, what is driven twice | keys and values that do not match in number |
+//! | skins with any number of joints, morph targets (position, normal, colour) | | morphed texture coordinates and tangents | joints and weights that do not match in number |
+//! | TRS and weights animation, all interpolations, all animations at once or the first | unusable keys: without them | pointers, what is driven twice | keys and values that do not match in number |
 
 mod accessor;
 mod animation;
 mod attributes;
 mod buffers;
 mod camera;
+mod choice;
+mod compressed;
 mod container;
 mod defaults;
 mod document;
 mod error;
 mod extensions;
 mod image;
+mod influences;
+mod instances;
 mod json;
 mod light;
 mod limits;
@@ -33,11 +38,13 @@ mod material;
 mod mesh;
 mod node;
 mod normals;
+mod skin;
 mod texture;
 mod topology;
 mod uri;
 mod warnings;
 
+pub use choice::{AnimationChoice, Choice, Pick};
 pub use error::{LoadError, Place, Problem};
 pub use limits::Limits;
-pub use load::{load, load_bytes, load_scene};
+pub use load::{load, load_bytes, load_chosen};

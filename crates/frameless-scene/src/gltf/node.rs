@@ -4,6 +4,7 @@ use glam::{Mat3, Mat4, Quat, Vec3, Vec4};
 
 use crate::{Node, Transform};
 
+use super::choice::Pick;
 use super::error::{Fault, quoted};
 use super::json::Json;
 use super::limits::{Limits, within};
@@ -18,12 +19,14 @@ pub(super) struct Hierarchy {
     pub(super) index_of: Vec<Option<u32>>,
     /// For every one of `nodes`: its index in the file.
     pub(super) file_index: Vec<usize>,
+    /// The file's scene that these are the nodes of, if the file has scenes.
+    pub(super) scene: Option<usize>,
 }
 
 /// Builds the hierarchy of scene `chosen`, else of the file's default scene, else of its first, else of all nodes.
 pub(super) fn load_nodes(
     root: &Json<'_>,
-    chosen: Option<usize>,
+    chosen: Option<&Pick>,
     limits: &Limits,
     warnings: &mut Warnings,
 ) -> Result<Hierarchy, Fault> {
@@ -31,17 +34,18 @@ pub(super) fn load_nodes(
     within(file_nodes.len() as u64, limits.nodes, "nodes", "/nodes")?;
     let family = Family::parse(&file_nodes)?;
     let scene_roots = parse_scenes(root, &family)?;
-    let roots = match chosen_scene(root, chosen, scene_roots.len())? {
+    let shown = chosen_scene(root, chosen)?;
+    let roots = match shown {
         Some(scene) => scene_roots[scene].clone(),
         None => family.roots(),
     };
-    if scene_roots.len() > 1 {
+    if scene_roots.len() > 1 && chosen.is_none() {
         warnings.add(format!("only one of the file's {} scenes is shown", scene_roots.len()));
     }
     let rest = parse_transforms(&file_nodes, warnings)?;
     let order = family.parents_first(&roots, limits)?;
     let mut hierarchy =
-        Hierarchy { index_of: vec![None; file_nodes.len()], ..Hierarchy::default() };
+        Hierarchy { index_of: vec![None; file_nodes.len()], scene: shown, ..Hierarchy::default() };
     for (index, &file_index) in order.iter().enumerate() {
         hierarchy.index_of[file_index] = Some(index as u32);
         let parent = family.parent[file_index].and_then(|parent| hierarchy.index_of[parent]);
@@ -138,21 +142,14 @@ fn scene_nodes(scene: &Json<'_>, family: &Family) -> Result<Vec<usize>, Fault> {
     Ok(roots)
 }
 
-fn chosen_scene(
-    root: &Json<'_>,
-    chosen: Option<usize>,
-    count: usize,
-) -> Result<Option<usize>, Fault> {
+fn chosen_scene(root: &Json<'_>, chosen: Option<&Pick>) -> Result<Option<usize>, Fault> {
+    let scenes = root.list("scenes")?;
     let default = match root.field("scene")? {
-        Some(scene) => Some(scene.index(count, "scenes")?),
-        None => (count > 0).then_some(0),
+        Some(scene) => Some(scene.index(scenes.len(), "scenes")?),
+        None => (!scenes.is_empty()).then_some(0),
     };
     match chosen {
-        Some(scene) if scene >= count => {
-            let wanted = format!("scene {scene}, as was asked for");
-            Err(Fault::at("/scenes", wanted, format!("{count} scenes")))
-        }
-        Some(scene) => Ok(Some(scene)),
+        Some(pick) => pick.find(&scenes, "scenes", "scene").map(Some),
         None => Ok(default),
     }
 }

@@ -2,7 +2,9 @@
 
 use glam::Vec3;
 
-use super::attributes::Vertices;
+use crate::Influences;
+
+use super::attributes::{TargetVertices, Vertices};
 
 /// (b − a) × (c − a), at length one; `None` for a triangle without area.
 fn face_normal(positions: &[Vec3], triangle: [u32; 3]) -> Option<Vec3> {
@@ -27,12 +29,27 @@ pub(super) fn flatten(vertices: &Vertices, triangles: &mut [[u32; 3]]) -> Vertic
         normals,
         uvs: vertices.uvs.each_ref().map(|uvs| uvs.as_ref().map(|uvs| pick(uvs, &corners))),
         colors: vertices.colors.as_ref().map(|colors| pick(colors, &corners)),
+        influences: vertices.influences.iter().map(|set| pick_influences(set, &corners)).collect(),
+        targets: vertices.targets.iter().map(|target| pick_target(target, &corners)).collect(),
         nowhere: corners.iter().enumerate().filter(nowhere).map(|(i, _)| i as u32).collect(),
     }
 }
 
 fn pick<T: Copy>(values: &[T], corners: &[u32]) -> Vec<T> {
     corners.iter().map(|&corner| values[corner as usize]).collect()
+}
+
+fn pick_influences(set: &Influences, corners: &[u32]) -> Influences {
+    Influences { joints: pick(&set.joints, corners), weights: pick(&set.weights, corners) }
+}
+
+/// Without normals: those of the base are ours.
+fn pick_target(target: &TargetVertices, corners: &[u32]) -> TargetVertices {
+    TargetVertices {
+        positions: target.positions.as_ref().map(|positions| pick(positions, corners)),
+        normals: None,
+        colors: target.colors.as_ref().map(|colors| pick(colors, corners)),
+    }
 }
 
 /// Brings all normals to length one. Those without a direction become the mean of the faces around them, or +y where

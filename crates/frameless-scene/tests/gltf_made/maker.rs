@@ -71,6 +71,7 @@ impl Maker {
             "SCALAR" => 1,
             "VEC2" => 2,
             "VEC3" => 3,
+            "MAT4" => 16,
             _ => 4,
         };
         let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
@@ -152,6 +153,13 @@ pub(crate) fn rich() -> Maker {
     maker.json["accessors"][position]["sparse"] = json!({"count": 2,
         "indices": {"bufferView": sparse_indices, "componentType": U16},
         "values": {"bufferView": sparse_values, "byteOffset": 0}});
+    let bulge = maker.floats("VEC3", &SQUARE);
+    let joints = maker.accessor(U8, "VEC4", 4, &[0, 1, 0, 0].repeat(4));
+    let weights = maker.accessor(U16, "VEC4", 4, &[0, 128, 255, 127, 0, 0, 0, 0].repeat(4));
+    maker.json["accessors"][weights]["normalized"] = json!(true);
+    let turned = [0.0, 1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 1.0];
+    let bind = maker.floats("MAT4", &turned.repeat(2));
+    let swells = maker.floats("SCALAR", &[0.0, 1.0]);
     let times = maker.floats("SCALAR", &[0.0, 1.0]);
     let moves = maker.floats("VEC3", &[0.0, 0.0, 0.0, 1.0, 2.0, 3.0]);
     let turns = maker.floats("VEC4", &[0.0, 0.0, 0.0, 1.0].repeat(6));
@@ -173,8 +181,10 @@ pub(crate) fn rich() -> Maker {
     maker.push(
         "meshes",
         json!({"name": "square", "primitives": [{"mode": 4, "material": 0,
-        "attributes": {"POSITION": position, "NORMAL": normal, "TEXCOORD_0": uv, "COLOR_0": color},
-        "indices": indices, "targets": [{"POSITION": position}]}]}),
+        "attributes": {"POSITION": position, "NORMAL": normal, "TEXCOORD_0": uv, "COLOR_0": color,
+            "JOINTS_0": joints, "WEIGHTS_0": weights},
+        "indices": indices, "targets": [{"POSITION": bulge, "NORMAL": normal, "COLOR_0": color}]}],
+        "weights": [0.25]}),
     );
     maker.push(
         "cameras",
@@ -185,14 +195,14 @@ pub(crate) fn rich() -> Maker {
         json!({"type": "orthographic",
         "orthographic": {"xmag": 1.0, "ymag": 2.0, "znear": 0.0, "zfar": 1.0}}),
     );
-    maker.push("skins", json!({"joints": [2], "skeleton": 2}));
+    maker.push("skins", json!({"joints": [2, 0], "skeleton": 2, "inverseBindMatrices": bind}));
     maker.push(
         "nodes",
         json!({"children": [1, 2], "translation": [1.0, 2.0, 3.0],
         "rotation": [0.0, 1.0, 0.0, 0.0], "scale": [1.0, -1.0, 1.0], "camera": 0}),
     );
     let light = json!({"KHR_lights_punctual": {"light": 0}});
-    maker.push("nodes", json!({"mesh": 0, "skin": 0, "extensions": light}));
+    maker.push("nodes", json!({"mesh": 0, "skin": 0, "weights": [0.5], "extensions": light}));
     maker.push("nodes", json!({"camera": 1,
         "matrix": [1.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 5.0, 6.0, 7.0, 1.0]}));
     maker.push("scenes", json!({"nodes": [0]}));
@@ -206,9 +216,11 @@ pub(crate) fn rich() -> Maker {
         "animations",
         json!({"channels": [
             {"sampler": 0, "target": {"node": 0, "path": "translation"}},
-            {"sampler": 1, "target": {"node": 1, "path": "rotation"}}],
+            {"sampler": 1, "target": {"node": 1, "path": "rotation"}},
+            {"sampler": 2, "target": {"node": 1, "path": "weights"}}],
         "samplers": [{"input": times, "output": moves, "interpolation": "LINEAR"},
-            {"input": times, "output": turns, "interpolation": "CUBICSPLINE"}]}),
+            {"input": times, "output": turns, "interpolation": "CUBICSPLINE"},
+            {"input": times, "output": swells}]}),
     );
     maker
 }

@@ -1,6 +1,6 @@
 //! Keyframe animation.
 
-use frameless_scene::{Interpolation, Target, Values};
+use frameless_scene::{Choice, Interpolation, Limits, Scene, Target, Values, load_chosen};
 use glam::{Quat, Vec3};
 use serde_json::{Value, json};
 
@@ -105,16 +105,54 @@ fn values_that_do_not_match_the_keys_are_refused() {
 }
 
 #[test]
-fn animations_are_merged_and_the_first_wins() {
+fn animations_play_together_or_the_first_alone() {
     let mut maker = moved("translation", "LINEAR", &[0.0, 1.0], &[0.0; 6]);
-    add_animation(&mut maker, "translation", "LINEAR", &[0.0, 9.0], &[5.0; 6]);
     add_animation(&mut maker, "scale", "LINEAR", &[0.0, 3.0], &[1.0; 6]);
     let scene = maker.load();
-    let targets: Vec<_> = scene.animation.channels.iter().map(|channel| channel.target).collect();
-    assert_eq!(targets, [Target::Translation(0), Target::Scale(0)]);
-    assert_eq!(scene.animation.duration_secs, 3.0, "that of what is played");
-    assert!(scene.warnings[0].contains("earlier animation"), "{:?}", scene.warnings);
+    assert_eq!(driven(&scene), [Target::Translation(0), Target::Scale(0)]);
+    assert_eq!((scene.animation.duration_secs, scene.contents.played), (3.0, vec![0, 1]));
+    assert!(!scene.warnings.iter().any(|warning| warning.contains("animation")));
+    add_animation(&mut maker, "translation", "LINEAR", &[0.0, 9.0], &[5.0; 6]);
+    let scene = maker.load();
+    assert_eq!(driven(&scene), [Target::Translation(0)], "the first and the last compete");
+    assert_eq!(scene.animation.duration_secs, 1.0, "that of what is played");
+    assert!(scene.warnings[0].contains("only animation \"an animation\" is played"));
     assert_eq!(scene.animation.channels[0].interpolation, Interpolation::Linear);
+}
+
+fn driven(scene: &Scene) -> Vec<Target> {
+    scene.animation.channels.iter().map(|channel| channel.target).collect()
+}
+
+#[test]
+fn animations_may_be_chosen() {
+    let mut maker = moved("translation", "LINEAR", &[0.0, 1.0], &[0.0; 6]);
+    add_animation(&mut maker, "scale", "LINEAR", &[0.0, 3.0], &[1.0; 6]);
+    add_animation(&mut maker, "translation", "LINEAR", &[0.0, 9.0], &[5.0; 6]);
+    maker.json["animations"][2]["name"] = json!("jump");
+    let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("animations.glb");
+    std::fs::write(&path, maker.glb()).unwrap();
+    let load = |text: &str| {
+        let animation = text.parse().unwrap_or_default();
+        load_chosen(&path, &Choice { animation, ..Choice::default() }, &Limits::default())
+    };
+    for (text, played, secs) in [
+        ("none", vec![], 0.0),
+        ("1", vec![1], 3.0),
+        ("jump", vec![2], 9.0),
+        ("all", vec![0, 1, 2], 3.0),
+    ] {
+        let scene = load(text).unwrap();
+        assert_eq!(
+            (scene.contents.played, scene.animation.duration_secs),
+            (played, secs),
+            "{text}"
+        );
+    }
+    let all = load("all").unwrap();
+    assert!(all.warnings[0].contains("earlier animation"), "{:?}", all.warnings);
+    let error = load("swim").unwrap_err().to_string();
+    assert!(error.contains("wanted animation \"swim\"") && error.contains("2 \"jump\""), "{error}");
 }
 
 #[test]
@@ -135,10 +173,10 @@ fn nodes_outside_the_scene_are_not_moved() {
 }
 
 #[test]
-fn weights_and_pointers_are_left_out_aloud() {
+fn weights_of_nothing_and_pointers_are_left_out_aloud() {
     for path in ["weights", "pointer"] {
         let mut maker = moved("translation", "LINEAR", &[0.0], &[0.0; 3]);
-        maker.json["animations"][0]["channels"][0]["target"] = json!({"path": path});
+        maker.json["animations"][0]["channels"][0]["target"] = json!({"node": 0, "path": path});
         let scene = maker.load();
         assert!(scene.animation.channels.is_empty());
         assert!(scene.warnings[0].contains(path), "{:?}", scene.warnings);

@@ -1,6 +1,6 @@
 //! The transform hierarchy, scenes, cameras and lights.
 
-use frameless_scene::{LightKind, Limits, Projection, Transform, load_scene};
+use frameless_scene::{Choice, LightKind, Limits, Projection, Transform, load_chosen};
 use glam::{Mat4, Quat, Vec3};
 use serde_json::json;
 
@@ -101,7 +101,7 @@ fn the_default_scene_is_shown_unless_another_is_asked_for() {
     );
     maker.json["nodes"] =
         json!([{"mesh": 0, "name": "a"}, {"mesh": 0, "name": "b"}, {"name": "c"}]);
-    maker.json["scenes"] = json!([{"nodes": [0, 2]}, {"nodes": [1]}]);
+    maker.json["scenes"] = json!([{"nodes": [0, 2], "name": "7"}, {"nodes": [1], "name": "yard"}]);
     assert_eq!(maker.load().nodes[0].name, "a", "the first, as there is no default");
     maker.json["scene"] = json!(1);
     let scene = maker.load();
@@ -110,10 +110,21 @@ fn the_default_scene_is_shown_unless_another_is_asked_for() {
     assert!(scene.warnings[0].contains("2 scenes"), "{:?}", scene.warnings);
     let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("scenes.glb");
     std::fs::write(&path, maker.glb()).unwrap();
-    let first = load_scene(&path, Some(0), &Limits::default()).unwrap();
-    assert_eq!(first.nodes[0].name, "a");
-    let error = load_scene(&path, Some(2), &Limits::default()).unwrap_err().to_string();
-    assert!(error.ends_with("/scenes: wanted scene 2, as was asked for, got 2 scenes"), "{error}");
+    let load = |text: &str| {
+        let choice = Choice { scene: text.parse().ok(), ..Choice::default() };
+        load_chosen(&path, &choice, &Limits::default())
+    };
+    let first = load("0").unwrap();
+    assert_eq!((first.nodes[0].name.as_str(), first.contents.shown_scene), ("a", Some(0)));
+    assert!(first.warnings.is_empty(), "it was asked for: {:?}", first.warnings);
+    assert_eq!(load("7").unwrap().nodes[0].name, "a", "a name that is a number");
+    assert_eq!(load("yard").unwrap().nodes[0].name, "b");
+    let there = "got 2 scenes: 0 \"7\", 1 \"yard\"";
+    for (wrong, wanted) in [("2", "scene 2"), ("barn", "scene \"barn\"")] {
+        let error = load(wrong).unwrap_err().to_string();
+        let expected = format!("/scenes: wanted {wanted}, as was asked for, {there}");
+        assert!(error.ends_with(&expected), "{error}");
+    }
     maker.json["scene"] = json!(2);
     assert!(maker.refusal().contains("/scene: "));
 }

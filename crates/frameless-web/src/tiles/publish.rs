@@ -15,7 +15,7 @@ use super::Grid;
 
 /// A change of a tile that is seen: mean squared difference of its pixels (Σ over the channels, 8 bits each). A pixel in a hundred
 /// that is off by six steps in each channel, or one that is off by thirty.
-pub(crate) const SEEN: f64 = 1.0;
+const SEEN: f64 = 1.0;
 /// What nobody sees is published this often.
 const UNSEEN_INTERVAL: Duration = Duration::from_millis(500);
 /// Without a change that is seen for so long the picture is calm.
@@ -205,12 +205,12 @@ fn digest(grid: &Grid, tile: usize, rgba: &[[u8; 4]]) -> u64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use frameless_session::{Ages, Status};
 
     use super::*;
 
-    pub(crate) fn picture(size: Size, rgba: Vec<[u8; 4]>) -> Picture {
+    pub(in crate::tiles) fn picture(size: Size, rgba: Vec<[u8; 4]>) -> Picture {
         let status = Status {
             scene_secs: 0.0,
             samples_per_sec: 0.0,
@@ -227,7 +227,7 @@ mod tests {
         picture(SIZE, vec![[level, level, level, 255]; SIZE.pixels()])
     }
 
-    fn new(taken: Taken) -> Arc<Published> {
+    pub(in crate::tiles) fn published(taken: Taken) -> Arc<Published> {
         match taken {
             Taken::New(published) => published,
             Taken::Same(_) => panic!("not published"),
@@ -238,10 +238,10 @@ mod tests {
     fn what_is_seen_is_published_at_once_and_the_same_never() {
         let now = Instant::now();
         let mut publisher = Publisher::new(now);
-        let first = new(publisher.take(grey(10), Vec::new(), false, now));
+        let first = published(publisher.take(grey(10), Vec::new(), false, now));
         let mut other = grey(10);
         other.rgba[5][0] = 90;
-        let second = new(publisher.take(other, Vec::new(), false, now));
+        let second = published(publisher.take(other, Vec::new(), false, now));
         assert!(second.number > first.number);
         assert_ne!(second.digests[0], first.digests[0]);
         assert_eq!(second.digests[1..], first.digests[1..]);
@@ -256,7 +256,7 @@ mod tests {
     fn what_nobody_sees_waits_half_a_second_and_still_comes() {
         let now = Instant::now();
         let mut publisher = Publisher::new(now);
-        new(publisher.take(grey(10), Vec::new(), false, now));
+        published(publisher.take(grey(10), Vec::new(), false, now));
         let one_step = || {
             let mut picture = grey(10);
             picture.rgba[7] = [11, 10, 10, 255];
@@ -264,26 +264,26 @@ mod tests {
         };
         let at = |ms| now + Duration::from_millis(ms);
         assert!(matches!(publisher.take(one_step(), Vec::new(), false, at(100)), Taken::Same(_)));
-        let published = new(publisher.take(one_step(), Vec::new(), false, at(510)));
-        assert!(published.calm);
+        let shown = published(publisher.take(one_step(), Vec::new(), false, at(510)));
+        assert!(shown.calm);
     }
 
     #[test]
     fn a_slow_fade_is_seen_before_half_a_second() {
         let now = Instant::now();
         let mut publisher = Publisher::new(now);
-        new(publisher.take(grey(10), Vec::new(), false, now));
+        published(publisher.take(grey(10), Vec::new(), false, now));
         // One step in each channel: 3 ≥ SEEN.
-        assert!(!new(publisher.take(grey(11), Vec::new(), false, now)).calm);
+        assert!(!published(publisher.take(grey(11), Vec::new(), false, now)).calm);
     }
 
     #[test]
     fn another_size_is_another_generation() {
         let now = Instant::now();
         let mut publisher = Publisher::new(now);
-        let first = new(publisher.take(grey(10), Vec::new(), false, now));
+        let first = published(publisher.take(grey(10), Vec::new(), false, now));
         let small = picture(Size::new(1, 1), vec![[0, 0, 0, 255]]);
-        let second = new(publisher.take(small, Vec::new(), false, now));
+        let second = published(publisher.take(small, Vec::new(), false, now));
         assert!(second.generation > first.generation && second.number > first.number);
         assert_eq!(second.digests.len(), 1);
     }
@@ -294,7 +294,7 @@ mod tests {
         // "123456789", whose CRC-32 is known.
         let rgba = vec![*b"123\xff", *b"456\xff", *b"789\xff"];
         let three = picture(Size::new(1, 3), rgba);
-        let published = new(Publisher::new(now).take(three, Vec::new(), false, now));
-        assert_eq!(published.crc(), 0xcbf4_3926);
+        let shown = published(Publisher::new(now).take(three, Vec::new(), false, now));
+        assert_eq!(shown.crc(), 0xcbf4_3926);
     }
 }

@@ -3,12 +3,14 @@
 //! A tile that has visibly changed is sent lossily, those first that changed most times waited longest. Once it has been quiet it is sent
 //! exactly. Differences that nobody sees are sent exactly, too, and ever more seldom while the rest of the picture moves.
 
-use super::publish::SEEN;
 use super::{Grid, Published};
 
-/// A tile that has not visibly changed for so long is refined.
+/// A change that is worth JPEG: mean squared difference of a tile's pixels (Σ over the channels, 8 bits each). JPEG's own error is two to three times
+/// this: below, a tile that is exact by now would become worse. One pixel in the tile that is off by 64 in each channel is more.
+const WORTH_LOSSY: f64 = 12.0;
+/// A tile that has not changed for so long is sent exactly.
 const QUIET_MS: u32 = 120;
-/// An exact tile whose present difference nobody sees is refined again after this, doubled each time.
+/// One that goes on changing, in a way that is not worth JPEG, is sent exactly all the same after this, doubled each time.
 const UNSEEN_MS: u32 = 500;
 /// 0.5 s · 2⁴ = 8 s at most.
 const MOST_DOUBLINGS: u8 = 4;
@@ -17,7 +19,7 @@ const NEVER: f64 = 3.0 * 255.0 * 255.0;
 /// In one message. 512 · 32 · 32 pixels are 1.5 MB of RGB, which each client may hold while it is encoded.
 const MOST_TILES: usize = 512;
 
-/// Of one client. 32 bytes per tile.
+/// Of one client. 40 bytes per tile.
 pub(crate) struct Seen {
     generation: u32,
     tiles: Vec<Tile>,
@@ -29,8 +31,11 @@ struct Tile {
     digest: u64,
     /// When it was sent, see [`Published::change_sums`].
     change_sum: u64,
-    /// When it was sent last, or was seen to change.
+    /// When it was sent last.
+    sent_ms: u32,
+    /// When its bytes were seen to change last, and to what.
     stirred_ms: u32,
+    latest: u32,
     /// Since when it has been different in a way that is seen; 0: it is not.
     waiting_ms: u32,
     sent: bool,
@@ -115,13 +120,13 @@ impl Seen {
     pub(crate) fn sent(&mut self, picture: &Published, chosen: &Chosen, now_ms: u32) {
         for &index in &chosen.tiles {
             let tile = &mut self.tiles[usize::from(index)];
-            tile.doublings = match chosen.lossless && tile.exact {
+            tile.doublings = match chosen.lossless {
                 true => (tile.doublings + 1).min(MOST_DOUBLINGS),
                 false => 0,
             };
             tile.digest = picture.digests[usize::from(index)];
             tile.change_sum = picture.change_sums[usize::from(index)];
-            (tile.stirred_ms, tile.waiting_ms) = (now_ms, 0);
+            (tile.sent_ms, tile.waiting_ms) = (now_ms, 0);
             (tile.sent, tile.exact) = (true, chosen.lossless);
         }
     }
@@ -129,7 +134,11 @@ impl Seen {
 
 impl Tile {
     fn need(&mut self, picture: &Published, grid: &Grid, index: usize, now_ms: u32) -> Need {
-        let same = self.sent && self.digest == picture.digests[index];
+        let digest = picture.digests[index];
+        if self.latest != digest as u32 {
+            (self.latest, self.stirred_ms) = (digest as u32, now_ms);
+        }
+        let same = self.sent && self.digest == digest;
         if same && self.exact {
             self.waiting_ms = 0;
             return Need::Nothing;
@@ -139,7 +148,7 @@ impl Tile {
             true => changed as f64 / f64::from(grid.pixels(index)),
             false => NEVER,
         };
-        if !same && change >= SEEN {
+        if !same && change >= WORTH_LOSSY {
             if self.waiting_ms == 0 {
                 self.waiting_ms = now_ms;
             }
@@ -147,10 +156,153 @@ impl Tile {
             return Need::Lossy { priority: change * f64::from(waited_ms) };
         }
         self.waiting_ms = 0;
-        let rest_ms = match self.exact && !picture.calm {
-            true => UNSEEN_MS << self.doublings,
-            false => QUIET_MS,
+        let at_ms = match (picture.calm, self.doublings) {
+            (true, _) => self.sent_ms + QUIET_MS,
+            (false, 0) => {
+                (self.stirred_ms.max(self.sent_ms) + QUIET_MS).min(self.sent_ms + UNSEEN_MS)
+            }
+            (false, doublings) => {
+                (self.stirred_ms + UNSEEN_MS).min(self.sent_ms + (UNSEEN_MS << doublings))
+            }
         };
-        Need::Exact { in_ms: (self.stirred_ms + rest_ms).saturating_sub(now_ms) }
+        Need::Exact { in_ms: at_ms.saturating_sub(now_ms) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::time::Instant;
+
+    use frameless::Size;
+
+    use super::*;
+    use crate::tiles::publish::tests::{picture, published};
+    use crate::tiles::{Publisher, SIDE};
+
+    const SIZE: Size = Size { width: 4 * SIDE, height: SIDE };
+    const PLENTY: [usize; 2] = [100, 100];
+
+    /// Four grey tiles, some pixels of which have another level.
+    struct Scene {
+        publisher: Publisher,
+        rgba: Vec<[u8; 4]>,
+        now: Instant,
+    }
+
+    impl Scene {
+        fn new() -> Scene {
+            let now = Instant::now();
+            let rgba = vec![[100, 100, 100, 255]; SIZE.pixels()];
+            Scene { publisher: Publisher::new(now), rgba, now }
+        }
+
+        /// After bits of some pixels of a tile have been turned.
+        fn flip(&mut self, tile: u32, pixels: u32, bits: u8) -> Arc<Published> {
+            for pixel in 0..pixels {
+                let at = tile * SIDE + pixel % SIDE + pixel / SIDE * SIZE.width;
+                self.rgba[at as usize][0] ^= bits;
+            }
+            self.show()
+        }
+
+        fn show(&mut self) -> Arc<Published> {
+            published(self.publisher.take(
+                picture(SIZE, self.rgba.clone()),
+                Vec::new(),
+                true,
+                self.now,
+            ))
+        }
+    }
+
+    /// Chooses, and sends what was chosen.
+    fn send(seen: &mut Seen, shown: &Published, now_ms: u32, most: [usize; 2]) -> Chosen {
+        let chosen = seen.choose(shown, now_ms, most, false);
+        seen.sent(shown, &chosen, now_ms);
+        chosen
+    }
+
+    #[test]
+    fn everything_is_sent_once_then_exactly_and_then_nothing() {
+        let (mut scene, mut seen) = (Scene::new(), Seen::nothing());
+        let shown = scene.show();
+        let first = send(&mut seen, &shown, 1, PLENTY);
+        assert_eq!((first.tiles, first.lossless), (vec![0, 1, 2, 3], false));
+        let early = send(&mut seen, &shown, 50, PLENTY);
+        assert_eq!((early.tiles, early.wait_ms), (vec![], Some(1 + QUIET_MS - 50)));
+        let exact = send(&mut seen, &shown, 1 + QUIET_MS, PLENTY);
+        assert_eq!((exact.tiles, exact.lossless, exact.all_exact), (vec![0, 1, 2, 3], true, false));
+        let done = seen.choose(&shown, 1000, PLENTY, true);
+        assert_eq!(done, Chosen { all_exact: true, ..Chosen::default() });
+    }
+
+    fn exact_everywhere(scene: &mut Scene) -> Seen {
+        let mut seen = Seen::nothing();
+        let shown = scene.show();
+        send(&mut seen, &shown, 1, PLENTY);
+        send(&mut seen, &shown, 500, PLENTY);
+        seen
+    }
+
+    #[test]
+    fn what_changed_most_comes_first_and_what_waits_comes_in_the_end() {
+        let mut scene = Scene::new();
+        let mut seen = exact_everywhere(&mut scene);
+        scene.flip(1, 100, 32);
+        let mut waited = 0;
+        for step in 0..100 {
+            // Tile 3 changes 160 times as much as tile 1 has, again and again.
+            let shown = scene.flip(3, 1000, 128);
+            let chosen = send(&mut seen, &shown, 1000 + 16 * step, [1, 1]);
+            if chosen.tiles == [1] {
+                break;
+            }
+            waited = step;
+        }
+        assert!((1..20).contains(&waited), "tile 1 waited for {waited} others");
+    }
+
+    #[test]
+    fn what_nobody_sees_is_sent_exactly_and_ever_more_seldom() {
+        let mut scene = Scene::new();
+        let mut seen = exact_everywhere(&mut scene);
+        let mut sent = Vec::new();
+        for ms in (1000..20_000).step_by(50) {
+            // One pixel by one step, up and down.
+            scene.rgba[5][0] ^= 1;
+            let shown = scene.show();
+            let chosen = send(&mut seen, &shown, ms, PLENTY);
+            assert!(chosen.tiles.is_empty() || chosen.lossless);
+            if !chosen.tiles.is_empty() {
+                sent.push(ms);
+            }
+        }
+        let pauses: Vec<u32> = sent.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        assert!(pauses.is_sorted() && pauses.len() <= 4, "{pauses:?}");
+    }
+
+    #[test]
+    fn another_generation_begins_anew() {
+        let mut scene = Scene::new();
+        let mut seen = exact_everywhere(&mut scene);
+        let smaller = Size::new(SIDE + 1, 3);
+        let rgba = vec![[1, 2, 3, 255]; smaller.pixels()];
+        let taken = scene.publisher.take(picture(smaller, rgba), Vec::new(), false, scene.now);
+        let chosen = seen.choose(&published(taken), 1000, PLENTY, false);
+        assert_eq!(chosen.tiles, [0, 1]);
+    }
+
+    #[test]
+    fn a_message_has_a_bounded_number_of_tiles() {
+        let size = Size::new(3840, 2160);
+        let now = Instant::now();
+        let black = picture(size, vec![[0, 0, 0, 255]; size.pixels()]);
+        let shown = published(Publisher::new(now).take(black, Vec::new(), false, now));
+        let mut seen = Seen::nothing();
+        assert_eq!(seen.choose(&shown, 1, [usize::MAX; 2], true).tiles.len(), MOST_TILES);
+        let bytes = seen.tiles.len() * size_of::<Tile>();
+        assert_eq!(size_of::<Tile>(), 40);
+        assert!(bytes < 400_000, "{bytes} bytes for the largest picture");
     }
 }

@@ -3,7 +3,7 @@ is measured is the server's work and not a browser's.
 
     light_client.py URL SECS [--drive]
 
-Prints one JSON object: bytes, messages, the first status and the mean of the later ones, seconds between messages of tiles, and
+Prints one JSON object: bytes, messages, samples per second before it came and since, seconds between messages of tiles, and
 with --drive the milliseconds from inputs to the first tiles that show them.
 """
 
@@ -113,7 +113,7 @@ class Tally:
     """What came, and when."""
 
     def __init__(self):
-        self.statuses: list[float] = []
+        self.statuses: list[tuple[float, float]] = []
         self.arrivals: list[float] = []
         self.latencies_ms: list[float] = []
         self.waiting: list[tuple[int, float]] = []
@@ -124,7 +124,7 @@ class Tally:
         if opcode != BINARY:
             return
         if payload[0] == STATUS:
-            self.statuses.append(struct.unpack_from("<f", payload, 4)[0])
+            self.statuses.append(struct.unpack_from("<2f", payload, 4))
             return
         now = time.monotonic()
         sequence, shown = struct.unpack_from("<I", payload, 4)[0], struct.unpack_from("<I", payload, 24)[0]
@@ -133,13 +133,19 @@ class Tally:
         while self.waiting and self.waiting[0][0] <= shown:
             self.latencies_ms.append(1000 * (now - self.waiting.pop(0)[1]))
 
+    def _before(self) -> float | None:
+        """Samples per second while nobody looked. No pictures were made then: the first one that is ends a long interval without
+        any, and the rates that come with it are those of the interval."""
+        pictures, samples = min(((pictures, samples) for samples, pictures in self.statuses[:12]), default=(1.0, None))
+        return samples if pictures < 1.0 else None
+
     def summary(self, client: LightClient, secs: float) -> dict:
         gaps = [later - earlier for earlier, later in zip(self.arrivals, self.arrivals[1:])]
-        later = self.statuses[len(self.statuses) // 2 :]
+        later = [samples for samples, _ in self.statuses[len(self.statuses) // 2 :]]
         return {
             "bytes_per_sec": client.bytes / secs,
             "messages": len(self.arrivals),
-            "first_samples_per_sec": self.statuses[0] if self.statuses else None,
+            "samples_per_sec_before": self._before(),
             "samples_per_sec": sum(later) / len(later) if later else None,
             "gaps_secs": gaps,
             "latencies_ms": self.latencies_ms,

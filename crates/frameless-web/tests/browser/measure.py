@@ -221,15 +221,16 @@ def samples_lost(bench: Bench) -> dict:
     """Samples per second while nobody looks against one client: one that only acknowledges, and a browser on the same cores."""
     alone, light, browser = [], [], []
     with bench.server() as server:
-        time.sleep(2)
+        _light(server.url, 2)  # before the first picture there is nothing to count from
+        time.sleep(3)
         for _ in range(max(2, int(bench.secs(8)))):
             result = _light(server.url, 4)
-            alone.append(result["first_samples_per_sec"])
+            alone.extend(filter(None, [result["samples_per_sec_before"]]))
             light.append(result["samples_per_sec"])
             with bench.view(server) as view:
                 view.page.wait_for_timeout(4000)
                 browser.append(float(view.text("#hud-samples").replace(",", "")))
-            time.sleep(2)
+            time.sleep(3)
     base = float(np.median(alone))
     return {
         "samples_per_sec_alone": round(base),

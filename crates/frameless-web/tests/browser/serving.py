@@ -7,6 +7,7 @@ import signal
 import subprocess
 import tempfile
 import threading
+import time
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -82,7 +83,7 @@ def launch(playwright: Playwright) -> Browser:
 class View:
     """One page in a browser context of its own, with what its console says."""
 
-    def __init__(self, browser: Browser, url: str, size=(1280, 800), theme="dark", **options):
+    def __init__(self, browser: Browser, url: str, size=(1280, 800), theme="dark", before="", **options):
         self.context = browser.new_context(
             viewport={"width": size[0], "height": size[1]}, color_scheme=theme, **options
         )
@@ -90,8 +91,10 @@ class View:
         self.page: Page = self.context.new_page()
         self.page.on("console", self._console)
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.add_init_script(LISTEN)
+        self.page.add_init_script(LISTEN + before)
         self.page.goto(url)
+        # The address with the secret leads on to one without.
+        self.page.wait_for_url(lambda now: "key=" not in now)
 
     def _console(self, message) -> None:
         if message.type in ("error", "warning"):
@@ -103,9 +106,12 @@ class View:
     def __exit__(self, *_) -> None:
         self.context.close()
 
-    def wait(self, condition: str, timeout_secs: float = 15.0):
-        """Until a JavaScript expression is true."""
-        self.page.wait_for_function(condition, timeout=1000 * timeout_secs, polling=20)
+    def wait(self, condition: str, timeout_secs: float = 15.0) -> None:
+        """Until a JavaScript expression is true. Asked from outside: the page's own policy lets no text become a program in it."""
+        end = time.monotonic() + timeout_secs
+        while not self.page.evaluate(condition):
+            assert time.monotonic() < end, f"after {timeout_secs:.0f} s this is still not so: {condition}"
+            self.page.wait_for_timeout(20)
 
     def live(self, drives: bool = True) -> "View":
         """Until there is a picture, and this page drives it."""
@@ -118,9 +124,17 @@ class View:
     def text(self, selector: str) -> str:
         return self.page.locator(selector).inner_text()
 
-    def exact(self, timeout_secs: float = 15.0) -> None:
-        """Until the page has found its canvas equal to the server's picture."""
-        self.wait("document.querySelector('#picture').dataset.exact === 'true'", timeout_secs)
+    def exact(self, timeout_secs: float = 30.0) -> None:
+        """Until the page has found its canvas equal to the server's picture, and that has rested for a moment."""
+        rests = "performance.now() - seen.last > 250"
+        self.wait(f"{rests} && document.querySelector('#picture').dataset.exact === 'true'", timeout_secs)
+
+    def after(self, action) -> None:
+        """Does something that changes the picture; until the page shows what came of it, exactly."""
+        drawn = self.page.evaluate("seen.drawn")
+        action()
+        self.wait(f"seen.drawn > {drawn}")
+        self.exact()
 
     def pixels(self) -> np.ndarray:
         """What the canvas holds: height × width × 3, bytes."""
@@ -148,12 +162,18 @@ class View:
         self.page.mouse.move(x + by[0], y + by[1], steps=steps)
         self.page.mouse.up(button=button)
 
-    def pause(self, at_secs: float | None = None) -> None:
+    def pause(self) -> None:
         if self.page.locator("#play").get_attribute("aria-label") == "Pause":
             self.page.click("#play")
         self.wait("document.querySelector('#play').classList.contains('paused')")
-        if at_secs is not None:
-            self.scrub(at_secs)
+
+    def rest_at(self, secs: float) -> None:
+        """Paused at a time of the scene, without antialiasing, which would go on for seconds; until the page shows it exactly."""
+        self.page.uncheck("#antialias")
+        self.pause()
+        # From another time, so that there is a change to wait for.
+        self.after(lambda: self.scrub(secs + 0.3))
+        self.after(lambda: self.scrub(secs))
 
     def scrub(self, secs: float) -> None:
         self.page.locator("#scrub").evaluate(

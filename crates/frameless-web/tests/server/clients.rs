@@ -19,7 +19,7 @@ fn one_drives_the_others_watch_and_the_helm_changes_hands() {
     };
     drives(&mut second, Some(one));
     second.say(r#"{"type": "settings", "exposure_stops": 3}"#);
-    assert!(second.json("notice")["text"].to_string().contains("drives"));
+    second.notice("drives");
     second.say(r#"{"type": "drive", "on": true}"#);
     drives(&mut first, Some(two));
     drives(&mut second, Some(two));

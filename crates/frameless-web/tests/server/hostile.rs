@@ -127,7 +127,7 @@ fn ten_thousand_messages_close_their_own_connections_only() {
             }
         }
         // The other one is served all the while.
-        if closed % 100 == 0 {
+        if closed % 10 == 0 {
             watcher.until("a status", |_, received| {
                 matches!(received, Received::Status(_)).then_some(())
             });
@@ -150,6 +150,6 @@ fn a_message_that_is_too_long_ends_its_connection() {
             _ => {}
         }
     };
-    assert!(matches!(code, None | Some(1009)), "{code:?}");
+    assert_eq!(code, Some(1009));
     other.until("a status", |_, received| matches!(received, Received::Status(_)).then_some(()));
 }

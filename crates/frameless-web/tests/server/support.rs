@@ -72,7 +72,7 @@ impl Running {
         stream.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
         // A server that has refused already may have closed.
         stream.write_all(request).ok();
-        Answer::read(&mut stream)
+        Answer::read(&mut stream, request.starts_with(b"HEAD "))
     }
 
     /// A `GET` that is let in.
@@ -106,14 +106,15 @@ pub(crate) struct Answer {
 
 impl Answer {
     /// Head and, as far as its length is announced or the connection closes, body.
-    fn read(stream: &mut TcpStream) -> Answer {
+    fn read(stream: &mut TcpStream, is_head: bool) -> Answer {
         let (mut bytes, mut piece) = (Vec::new(), [0; 65536]);
         loop {
             let end = bytes.windows(4).position(|four| four == b"\r\n\r\n");
             if let Some(end) = end {
                 let head = String::from_utf8_lossy(&bytes[..end]).to_ascii_lowercase();
                 let length = head.lines().find_map(|line| line.strip_prefix("content-length: "));
-                let length = length.and_then(|length| length.parse().ok());
+                let announced = length.and_then(|length| length.parse().ok());
+                let length = if is_head { Some(0) } else { announced };
                 let body = &bytes[end + 4..];
                 let upgraded = head.starts_with("http/1.1 101");
                 if upgraded || length.is_some_and(|length: usize| body.len() >= length) {
@@ -285,6 +286,16 @@ impl Client {
             Received::Json(json) if json["type"] == kind => Some(json.clone()),
             _ => None,
         })
+    }
+
+    /// The next notice in which that stands.
+    pub(crate) fn notice(&mut self, part: &str) {
+        self.until(part, |_, received| match received {
+            Received::Json(json) if json["type"] == "notice" => {
+                json["text"].as_str().is_some_and(|text| text.contains(part)).then_some(())
+            }
+            _ => None,
+        });
     }
 
     /// The next state of which that holds.

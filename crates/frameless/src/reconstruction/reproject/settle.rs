@@ -392,11 +392,26 @@ fn each(mut bits: u32, mut act: impl FnMut(usize)) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Projection, Window};
 
     fn settled() -> (Settled, Display) {
         let mut settled = Settled::default();
         settled.fit(Size::new(1, 1));
         (settled, Display::default())
+    }
+
+    #[test]
+    fn nothing_rests_while_a_window_moves() {
+        let mut settled = settled().0;
+        let pose = |depth: f32| Pose {
+            picture_from_object: vec![Projection::default(); 2],
+            windows: vec![Window { depth: [[0.0, 0.0, depth]; 2], ..Window::default() }],
+            ..Pose::default()
+        };
+        settled.find_moved([&pose(1.0), &pose(1.0)]);
+        assert!([0, 1, Surface::SKY].iter().all(|&object| settled.rests(object)));
+        settled.find_moved([&pose(1.0), &pose(2.0)]);
+        assert!(![0, 1, Surface::SKY].iter().any(|&object| settled.rests(object)));
     }
 
     #[test]

@@ -1,0 +1,153 @@
+//! Triangles that shine, as light sources: one of them is drawn, and a point on it.
+//!
+//! ```text
+//! p(triangle) ∝ area in the object · luminance          p(ω) = p(triangle) / area in the world · r² / cosθ'
+//! ```
+//!
+//! The shares are made once: where instances are scaled they are not the best ones, but always right. Spheres, and what deforms,
+//! are met by chance only.
+
+use frameless_scene::{Geometry, Scene};
+use glam::{Vec3, Vec3A};
+
+use crate::build::corners;
+use crate::moment::Moment;
+use crate::world::World;
+
+/// All shining triangles of a scene.
+pub(crate) struct Emitters {
+    /// In the order of `up_to`.
+    triangles: Vec<Emitter>,
+    /// Sum of the shares up to and with each triangle; the last is 1.
+    up_to: Vec<f32>,
+    /// Per instance: where its triangles begin in `share_of`; `None` if none shines.
+    first_of: Vec<Option<u32>>,
+    /// Per triangle of such an instance.
+    share_of: Vec<f32>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Emitter {
+    instance: u32,
+    primitive: u32,
+    radiance: Vec3A,
+}
+
+/// Light from a point on a triangle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FromEmitter {
+    /// From where it is asked to the point, in metres.
+    pub(crate) to_light: Vec3A,
+    /// Linear RGB.
+    pub(crate) radiance: Vec3A,
+    /// With which the direction is drawn, per solid angle; positive.
+    pub(crate) density: f32,
+}
+
+impl Emitters {
+    /// Finds them.
+    pub(crate) fn new(scene: &Scene) -> Emitters {
+        let (mut triangles, mut weights) = (Vec::new(), Vec::new());
+        let (mut first_of, mut share_of) = (Vec::new(), Vec::new());
+        for (instance, placed) in scene.instances.iter().enumerate() {
+            first_of.push(None);
+            let Geometry::Mesh(mesh) = &scene.geometries[placed.geometry as usize] else {
+                continue;
+            };
+            if scene.deformation_of(instance).is_some() {
+                continue;
+            }
+            let radiance = |primitive: usize| {
+                let material = mesh.triangle_materials.get(primitive);
+                let material = material.and_then(|&index| scene.materials.get(index as usize));
+                material.map_or(Vec3::ZERO, |material| material.emissive)
+            };
+            if (0..mesh.triangles.len()).all(|primitive| radiance(primitive) == Vec3::ZERO) {
+                continue;
+            }
+            first_of[instance] = Some(share_of.len() as u32);
+            for primitive in 0..mesh.triangles.len() {
+                let (radiance, [a, b, c]) = (radiance(primitive), corners(mesh, primitive as u32));
+                let weight = luminance(radiance) * (b - a).cross(c - a).length();
+                share_of.push(weight);
+                if weight > 0.0 && weight.is_finite() {
+                    let (instance, primitive) = (instance as u32, primitive as u32);
+                    triangles.push(Emitter { instance, primitive, radiance: radiance.into() });
+                    weights.push(f64::from(weight));
+                }
+            }
+        }
+        let total: f64 = weights.iter().sum();
+        let mut sum = 0.0;
+        let up_to = weights.iter().map(|weight| {
+            sum += weight;
+            (sum / total) as f32
+        });
+        let up_to = up_to.collect();
+        share_of.iter_mut().for_each(|share| {
+            *share = if share.is_finite() {
+                (f64::from(*share) / total.max(f64::MIN_POSITIVE)) as f32
+            } else {
+                0.0
+            };
+        });
+        Emitters { triangles, up_to, first_of, share_of }
+    }
+
+    /// Light from a random point, if it faces `from` at all.
+    pub(crate) fn sample(
+        &self,
+        world: &World,
+        moment: &Moment,
+        from: Vec3A,
+        [pick, u, v]: [f32; 3],
+    ) -> Option<FromEmitter> {
+        let index = self.up_to.partition_point(|&up_to| up_to <= pick);
+        let emitter = *self.triangles.get(index)?;
+        let [a, b, c] = in_world(world, moment, emitter.instance, emitter.primitive)?;
+        let root = u.sqrt();
+        let to_light = a + root * ((1.0 - v) * (b - a) + v * (c - a)) - from;
+        let density = self.density(emitter.instance, emitter.primitive, [a, b, c], to_light);
+        let light = FromEmitter { to_light, radiance: emitter.radiance, density };
+        (density > 0.0 && density.is_finite()).then_some(light)
+    }
+
+    /// With which [`Emitters::sample`] would have found a point that a ray has met, per solid angle.
+    pub(crate) fn density_of(
+        &self,
+        world: &World,
+        moment: &Moment,
+        [instance, primitive]: [u32; 2],
+        to_light: Vec3A,
+    ) -> f32 {
+        if self.triangles.is_empty() {
+            return 0.0;
+        }
+        in_world(world, moment, instance, primitive)
+            .map_or(0.0, |corners| self.density(instance, primitive, corners, to_light))
+    }
+
+    fn density(&self, instance: u32, primitive: u32, corners: [Vec3A; 3], to: Vec3A) -> f32 {
+        let Some(first) = self.first_of[instance as usize] else { return 0.0 };
+        let share = self.share_of[(first + primitive) as usize];
+        let [a, b, c] = corners;
+        let twice_area = (b - a).cross(c - a);
+        // r² / cosθ' / area = 2 r³ / |to · (b − a)×(c − a)|
+        let r = to.length();
+        share * 2.0 * r * r * r / to.dot(twice_area).abs()
+    }
+}
+
+/// A triangle's corners now; `None` if it is none, or deforms.
+fn in_world(world: &World, moment: &Moment, instance: u32, primitive: u32) -> Option<[Vec3A; 3]> {
+    let scene = world.scene();
+    let geometry = scene.instances[instance as usize].geometry;
+    let Geometry::Mesh(mesh) = &scene.geometries[geometry as usize] else { return None };
+    let placed = moment.placed(instance);
+    Some(corners(mesh, primitive).map(|at| placed.world_from_object.transform_point3a(at.into())))
+}
+
+/// Of linear sRGB (Rec. 709).
+fn luminance(rgb: Vec3) -> f32 {
+    rgb.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+}
