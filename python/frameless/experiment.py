@@ -56,22 +56,20 @@ def compare(
 ) -> list[Row]:
     """Run every algorithm in every scene at every rate with every seed, and measure it at every refresh of a display.
 
-    Parameters
-    ----------
-    scenes : names of built-in scenes (``Scene.names()``) or paths of glTF files
-    algorithms : names ("random", "change+filter", "framed", "lowres60", "progressive", "temporal", ...), or pairs of a name and
+    Parameters:
+
+    - `scenes`: names of built-in scenes (``Scene.names()``) or paths of glTF files
+    - `algorithms`: names ("random", "change+filter", "framed", "lowres60", "progressive", "temporal", ...), or pairs of a name and
         what makes a sampler of a seed: ``("mine", MySampler)``. After a name +hold, +filter or +reproject says how samples are
         shown; without, it is +hold
-    samples_per_sec : how many samples may be traced per second of the simulated clock
-    size : (width, height) in pixels
-    seconds, unscored : how long a run lasts, and how much of its beginning does not count
-    display_hz : refreshes per second; each is compared with the ideal picture of that moment
-    seeds : of whatever is random; runs without randomness are made once
-    ssim_every, flip_every : measure these costly metrics at every so many-th refresh; 0: not at all
+    - `samples_per_sec`: how many samples may be traced per second of the simulated clock
+    - `size`: (width, height) in pixels
+    - `seconds`, `unscored`: how long a run lasts, and how much of its beginning does not count
+    - `display_hz`: refreshes per second; each is compared with the ideal picture of that moment
+    - `seeds`: of whatever is random; runs without randomness are made once
+    - `ssim_every`, `flip_every`: measure these costly metrics at every so many-th refresh; 0: not at all
 
-    Returns
-    -------
-    list of dicts, one per run; see Row. The same arguments give the same numbers.
+    Returns a list of dicts, one per run; see Row. The same arguments give the same numbers.
 
     Raises ValueError for what makes no sense; what a sampler of your own raises arrives as it is. Ctrl-C ends it at once.
     """

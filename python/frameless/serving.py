@@ -33,18 +33,18 @@ def serve(
 ) -> Served:
     """Show a renderer on a web page of this machine, and return at once. The last line of a notebook's cell shows it inline.
 
-    Parameters
-    ----------
-    render : see frameless.serving.Render; called in a thread of its own, with the interpreter held, about every `batch_ms`
-    size : (width, height) of the picture in pixels
-    camera : from where it is looked at first; dragging on the page moves it
-    sampler, reconstruction : by name, as in Session
-    batch_ms : milliseconds that a call of `render` should take; longer if calls are expensive
-    budget : samples per second at most
-    exposure : stops by which radiance is multiplied before it is shown
-    noisy : whether colours have noise; render is then called with seeds
-    port : where the page listens, on this machine only; default: any free port
-    allow_frame : origin of the pages that may show this one inside them, as notebooks do. Default: those that are reached under the
+    Parameters:
+
+    - `render`: see frameless.serving.Render; called in a thread of its own, with the interpreter held, about every `batch_ms`
+    - `size`: (width, height) of the picture in pixels
+    - `camera`: from where it is looked at first; dragging on the page moves it
+    - `sampler`, `reconstruction`: by name, as in Session
+    - `batch_ms`: milliseconds that a call of `render` should take; longer if calls are expensive
+    - `budget`: samples per second at most
+    - `exposure`: stops by which radiance is multiplied before it is shown
+    - `noisy`: whether colours have noise; render is then called with seeds
+    - `port`: where the page listens, on this machine only; default: any free port
+    - `allow_frame`: origin of the pages that may show this one inside them, as notebooks do. Default: those that are reached under the
         name localhost, at any port. A notebook opened as 127.0.0.1 or elsewhere shows no page inline; open `url` then
 
     Raises OSError if the port is taken, ValueError for values that make no sense.

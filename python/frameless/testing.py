@@ -16,10 +16,10 @@ Factory = Callable[[int], Sampler]
 def check_sampler(make: Factory, *, every_pixel_within: float = 2.0) -> None:
     """Run a sampler through what every sampler must do; raises AssertionError with what it did instead.
 
-    Parameters
-    ----------
-    make : makes a sampler of a seed
-    every_pixel_within : seconds in which every pixel of a still picture must be traced, at 13 samples per pixel and second
+    Parameters:
+
+    - `make`: makes a sampler of a seed
+    - `every_pixel_within`: seconds in which every pixel of a still picture must be traced, at 13 samples per pixel and second
     """
     check_convergence(make, every_pixel_within)
     check_floor(make)

@@ -103,7 +103,7 @@ fn types() -> Result<Done> {
 fn reference(out: &Path) -> Result<Done> {
     let mut pdoc = python();
     pdoc.current_dir(in_project("python/tests"));
-    pdoc.args(["-m", "pdoc", "--docformat", "numpy", "--output-directory"]).arg(out);
+    pdoc.args(["-m", "pdoc", "--docformat", "markdown", "--output-directory"]).arg(out);
     pdoc.args(["frameless", "!frameless._frameless", "!frameless.bench"]);
     said(&mut pdoc, CHECKS_WITHIN)?;
     let page = std::fs::read_to_string(out.join("frameless.html"))?;

@@ -191,13 +191,13 @@ impl Batch {
 
     /// Give colours to the session; they are in the next picture.
     ///
-    /// Parameters
-    /// ----------
-    /// rgb : linear RGB radiance, shape (n, 3), float32 or float64, finite
-    /// position : where the ray hit first, in world coordinates, shape (n, 3); with it, samples move with surfaces and camera
-    /// normal : unit normals there in world coordinates, shape (n, 3)
-    /// object_id : which object was hit, integers of shape (n,), from 0, stable over time; -1 where nothing was. Default 0
-    /// where : which samples of the batch are answered: their numbers, shape (n,), or a mask of all. Default: all, in order
+    /// Parameters:
+    ///
+    /// - `rgb`: linear RGB radiance, shape (n, 3), float32 or float64, finite
+    /// - `position`: where the ray hit first, in world coordinates, shape (n, 3); with it, samples move with surfaces and camera
+    /// - `normal`: unit normals there in world coordinates, shape (n, 3)
+    /// - `object_id`: which object was hit, integers of shape (n,), from 0, stable over time; -1 where nothing was. Default 0
+    /// - `where`: which samples of the batch are answered: their numbers, shape (n,), or a mask of all. Default: all, in order
     ///
     /// Arrays may be numpy's, in any memory order, or have `__dlpack__` (torch and jax on the CPU). They are copied.
     ///

@@ -18,11 +18,11 @@ type Rays<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>);
 
 /// A pinhole camera that looks at `target` from `eye`; immutable.
 ///
-/// Parameters
-/// ----------
-/// eye, target : three numbers each, in the scene's unit of length (world coordinates)
-/// up : direction that is upwards in the picture as far as it can be; default (0, 1, 0)
-/// fov : angle between the top and the bottom of the picture in degrees, above 0 and below 180; default 45
+/// Parameters:
+///
+/// - `eye`, `target`: three numbers each, in the scene's unit of length (world coordinates)
+/// - `up`: direction that is upwards in the picture as far as it can be; default (0, 1, 0)
+/// - `fov`: angle between the top and the bottom of the picture in degrees, above 0 and below 180; default 45
 ///
 /// A camera that a renderer is given also knows the size of the picture, so that `rays` needs none.
 ///
@@ -146,14 +146,14 @@ impl Camera {
 
     /// Rays through places in the picture.
     ///
-    /// Parameters
-    /// ----------
-    /// x, y : float arrays of shape (n,), pixels from the picture's top-left corner: the centre of the first pixel is (0.5, 0.5)
-    /// size : (width, height) of the picture; may be left out if the camera knows it
+    /// Parameters:
     ///
-    /// Returns
-    /// -------
-    /// (origin, direction) : two float32 arrays of shape (n, 3) in world coordinates; directions have length 1
+    /// - `x`, `y`: float arrays of shape (n,), pixels from the picture's top-left corner: the centre of the first pixel is (0.5, 0.5)
+    /// - `size`: (width, height) of the picture; may be left out if the camera knows it
+    ///
+    /// Returns:
+    ///
+    /// - (`origin`, `direction`): two float32 arrays of shape (n, 3) in world coordinates; directions have length 1
     ///
     /// Raises ValueError if the arrays are wrong or the size is not known.
     #[pyo3(signature = (x, y, size=None))]

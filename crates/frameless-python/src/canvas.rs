@@ -19,11 +19,11 @@ use crate::size::{PictureSize, pair};
 
 /// The newest sample of every pixel, and a reconstruction that makes pictures of them: a session without clock and sampler.
 ///
-/// Parameters
-/// ----------
-/// size : (width, height) in pixels
-/// reconstruction : "hold", "filter" or "reproject", the last with +deep or +antialias
-/// camera : from where samples with positions are seen; needed only for those
+/// Parameters:
+///
+/// - `size`: (width, height) in pixels
+/// - `reconstruction`: "hold", "filter" or "reproject", the last with +deep or +antialias
+/// - `camera`: from where samples with positions are seen; needed only for those
 ///
 /// Raises ValueError if there is no such reconstruction.
 #[pyclass(frozen, name = "Canvas", module = "frameless")]
@@ -101,11 +101,11 @@ impl PyCanvas {
 
     /// Keep samples of pixel centres, traced at `now` (seconds), and say what they changed.
     ///
-    /// Parameters
-    /// ----------
-    /// now : seconds, not before any sample kept so far
-    /// pixel : row-major numbers, integers of shape (n,)
-    /// rgb, position, normal, object_id : as in Batch.submit
+    /// Parameters:
+    ///
+    /// - `now`: seconds, not before any sample kept so far
+    /// - `pixel`: row-major numbers, integers of shape (n,)
+    /// - `rgb`, `position`, `normal`, `object_id`: as in Batch.submit
     ///
     /// Raises ValueError as Batch.submit does.
     #[pyo3(signature = (now, pixel, rgb, *, position=None, normal=None, object_id=None))]

@@ -22,7 +22,7 @@ fn pair(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<(Colours, Colour
 
 /// Root mean squared difference of two pictures over all pixels and channels; 0 if they are equal.
 ///
-/// a, b : shape (height, width, 3), display-referred sRGB in [0, 1]
+/// - `a`, `b`: shape (height, width, 3), display-referred sRGB in [0, 1]
 #[pyfunction]
 pub(crate) fn rmse(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<f64> {
     let (a, b, _) = pair(a, b)?;
@@ -31,7 +31,7 @@ pub(crate) fn rmse(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<f64> 
 
 /// Peak signal-to-noise ratio of two pictures in dB, -20 log10(RMSE); infinite if they are equal.
 ///
-/// a, b : shape (height, width, 3), display-referred sRGB in [0, 1]
+/// - `a`, `b`: shape (height, width, 3), display-referred sRGB in [0, 1]
 #[pyfunction]
 pub(crate) fn psnr(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<f64> {
     Ok(frameless_eval::psnr_db(rmse(a, b)?).unwrap_or(f64::INFINITY))
@@ -39,7 +39,7 @@ pub(crate) fn psnr(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<f64> 
 
 /// Structural similarity of two pictures (Wang et al. 2004) over luma, in [-1, 1]; 1 if they are equal.
 ///
-/// a, b : shape (height, width, 3), display-referred sRGB in [0, 1], each side at least 11 pixels
+/// - `a`, `b`: shape (height, width, 3), display-referred sRGB in [0, 1], each side at least 11 pixels
 #[pyfunction]
 pub(crate) fn ssim(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<f64> {
     let (a_colours, b_colours, width) = pair(a, b)?;
@@ -52,7 +52,7 @@ pub(crate) fn ssim(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<f64> 
 
 /// Mean FLIP difference of a picture `b` from a reference `a` (Andersson et al. 2020), in [0, 1]; 0 if they are equal.
 ///
-/// a, b : shape (height, width, 3), display-referred sRGB in [0, 1]
+/// - `a`, `b`: shape (height, width, 3), display-referred sRGB in [0, 1]
 #[pyfunction]
 pub(crate) fn flip(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<f64> {
     let (a_colours, b_colours, width) = pair(a, b)?;

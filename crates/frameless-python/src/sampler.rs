@@ -53,10 +53,10 @@ pub(crate) fn from_python(
 
 /// One of the samplers that come with the package.
 ///
-/// Parameters
-/// ----------
-/// name : "random", "permutation", "change" or "adaptive", with parameters in brackets: "adaptive(temporal=0.5)"
-/// seed : the same seed makes the same choices
+/// Parameters:
+///
+/// - `name`: "random", "permutation", "change" or "adaptive", with parameters in brackets: "adaptive(temporal=0.5)"
+/// - `seed`: the same seed makes the same choices
 ///
 /// Raises ValueError if there is no such sampler.
 #[pyclass(frozen, module = "frameless")]

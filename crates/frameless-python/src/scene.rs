@@ -185,11 +185,11 @@ impl Scene {
 
     /// The whole picture at one moment: linear RGB radiance of pixel centres, float32, shape (height, width, 3).
     ///
-    /// Parameters
-    /// ----------
-    /// size : (width, height) in pixels
-    /// time : seconds of the scene
-    /// camera : a Camera, or the number of one of the scene's; default 0
+    /// Parameters:
+    ///
+    /// - `size`: (width, height) in pixels
+    /// - `time`: seconds of the scene
+    /// - `camera`: a Camera, or the number of one of the scene's; default 0
     #[pyo3(signature = (size, time=0.0, camera=None))]
     fn render<'py>(
         &self,
@@ -215,11 +215,11 @@ impl Scene {
 
     /// Traces places in the picture: a scene is a function `render(x, y, time, camera)` like any other.
     ///
-    /// Parameters
-    /// ----------
-    /// x, y : float arrays of shape (n,), pixels from the picture's top-left corner
-    /// time : seconds of the scene
-    /// camera : one that knows the size of its picture, as batches' do; see Camera.with_size
+    /// Parameters:
+    ///
+    /// - `x`, `y`: float arrays of shape (n,), pixels from the picture's top-left corner
+    /// - `time`: seconds of the scene
+    /// - `camera`: one that knows the size of its picture, as batches' do; see Camera.with_size
     ///
     /// Returns Samples: linear RGB, with positions and normals in world coordinates and object numbers (-1: the sky).
     fn __call__<'py>(

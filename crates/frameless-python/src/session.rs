@@ -28,21 +28,21 @@ use crate::size::{PictureSize, pair};
 ///             batch.submit(render(batch.x, batch.y, batch.time))
 ///             show(session.image())
 ///
-/// Parameters
-/// ----------
-/// size : (width, height) in pixels
-/// sampler : a name ("adaptive", "change", "permutation", "random"; see BuiltinSampler) or an object with methods of Sampler
-/// reconstruction : "hold", "filter" or "reproject", the last with +relight, +deep, +antialias
-/// camera : the Camera through which the renderer looks; needed if answers carry positions
-/// seed : of all that is random
-/// batch : samples per batch; default: learned, so that a batch lasts `batch_ms`, or longer if calls are expensive
-/// batch_ms : milliseconds from choosing a batch to its answer that are aimed at. Feedback every 4 ms costs 8 to 15 % of the quality
+/// Parameters:
+///
+/// - `size`: (width, height) in pixels
+/// - `sampler`: a name ("adaptive", "change", "permutation", "random"; see BuiltinSampler) or an object with methods of Sampler
+/// - `reconstruction`: "hold", "filter" or "reproject", the last with +relight, +deep, +antialias
+/// - `camera`: the Camera through which the renderer looks; needed if answers carry positions
+/// - `seed`: of all that is random
+/// - `batch`: samples per batch; default: learned, so that a batch lasts `batch_ms`, or longer if calls are expensive
+/// - `batch_ms`: milliseconds from choosing a batch to its answer that are aimed at. Feedback every 4 ms costs 8 to 15 % of the quality
 ///     that 1 ms would have; a call of Python costs some ten microseconds
-/// budget : samples per second at most; default: as many as the renderer can
-/// simulated : samples per second of a simulated clock, on which sample n is traced at n / rate however long it takes: the same
+/// - `budget`: samples per second at most; default: as many as the renderer can
+/// - `simulated`: samples per second of a simulated clock, on which sample n is traced at n / rate however long it takes: the same
 ///     seed makes the same pictures. Default: the machine's clock
-/// noisy : whether colours have noise, as path tracing's; the renderer then makes its random numbers from Batch.seed
-/// exposure : stops (powers of two) by which radiance is multiplied before it is shown
+/// - `noisy`: whether colours have noise, as path tracing's; the renderer then makes its random numbers from Batch.seed
+/// - `exposure`: stops (powers of two) by which radiance is multiplied before it is shown
 ///
 /// Any thread may use a session; calls wait for each other, not for the interpreter. As a context manager it is closed at the end.
 ///
@@ -355,12 +355,12 @@ impl Session {
 
     /// Let `render(x, y, time, camera)` answer batches for so many seconds of the session's clock, or until it is closed.
     ///
-    /// Parameters
-    /// ----------
-    /// render : returns linear RGB of shape (n, 3), or Samples with positions. x, y: float32 arrays of shape (n,), pixels from the
+    /// Parameters:
+    ///
+    /// - `render`: returns linear RGB of shape (n, 3), or Samples with positions. x, y: float32 arrays of shape (n,), pixels from the
     ///     top-left corner; time: seconds of the scene; camera: the session's Camera or None. A session of a noisy renderer calls
     ///     render(x, y, time, camera, seed) with Batch.seed
-    /// seconds : how long; default: until `close` is called, by render or another thread
+    /// - `seconds`: how long; default: until `close` is called, by render or another thread
     ///
     /// Returns the number of samples kept. What render raises arrives as it is, and the session may be used on.
     #[pyo3(signature = (render, seconds=None))]
