@@ -3,7 +3,7 @@
 import { acknowledgement, read } from "./protocol.js";
 
 const FIRST_WAIT_MS = 250;
-const LONGEST_WAIT_MS = 2000;
+const LONGEST_WAIT_MS = 1000;
 // The server says something once a second at the least.
 const SILENCE_MS = 5000;
 

@@ -180,7 +180,7 @@ impl Connection {
     }
 
     async fn send_tiles(&mut self, ready: Ready) -> Result<(), End> {
-        let Ready { outgoing, picture, message, all_exact, wait } = ready;
+        let Ready { outgoing, picture, message, moves, all_exact, wait } = ready;
         self.outgoing = Some(outgoing);
         let now = Instant::now();
         self.look_at = wait.map(|wait| now + wait);
@@ -189,6 +189,9 @@ impl Connection {
             // What else is there to send is seen when it has been sent.
             self.look = true;
             self.flow.send(message.len(), now);
+            if moves {
+                self.hub.moved(message.len());
+            }
             self.send(Message::binary(message)).await?;
         }
         let exact = self.exact.as_ref().map(|picture| picture.number);

@@ -9,7 +9,7 @@ mod opening;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use anyhow::bail;
@@ -35,6 +35,11 @@ use crate::wire::{Level, Said, Told};
 const CALM_INTERVAL: Duration = Duration::from_millis(50);
 /// Nothing that is seen has changed and nobody has done anything for so long.
 const CALM_AFTER: Duration = Duration::from_secs(1);
+/// After somebody has done something, pictures come as fast as they can for so long.
+const HURRIED_FOR: Duration = Duration::from_millis(300);
+/// What moves by itself takes so much of each client's link, as long as that leaves 20 pictures per second.
+const UNHURRIED_BYTES_PER_SEC: f64 = 450e3;
+const LONGEST_UNHURRIED: Duration = Duration::from_millis(50);
 /// A client that is told why it may not act is not told again for so long.
 const BETWEEN_REFUSALS: Duration = Duration::from_secs(2);
 
@@ -59,7 +64,8 @@ pub(crate) struct Hub<W: Send + 'static> {
     // Memory for the next picture; none while one is being made.
     memory: Option<Vec<[u8; 4]>>,
     acted_at: Instant,
-    painted: Arc<AtomicU64>,
+    // Between two pictures that nobody waits for.
+    unhurried: Duration,
     pictures: watch::Sender<Option<Arc<Published>>>,
     statuses: watch::Sender<LoopStatus>,
     opening: Option<Opening<W>>,
@@ -78,12 +84,12 @@ where
     let (events, inbox) = mpsc::channel(events::MOST_WAITING);
     let (pictures, watched) = watch::channel(None);
     let (statuses, status) = watch::channel(LoopStatus::default());
-    let painted = Arc::new(AtomicU64::new(0));
     let handle = HubHandle {
         events: events.clone(),
         pictures: watched,
         statuses: status,
-        painted: Arc::clone(&painted),
+        painted: Arc::default(),
+        moved_bytes: Arc::default(),
     };
     let Show { session, helm, scenes } = show;
     let (settings, size) = (*session.settings(), session.size());
@@ -106,7 +112,7 @@ where
         overlay: None,
         memory: Some(Vec::new()),
         acted_at: Instant::now(),
-        painted,
+        unhurried: Duration::ZERO,
         pictures,
         statuses,
         opening: None,
@@ -297,7 +303,7 @@ impl<W: Send + 'static> Hub<W> {
         if self.wants_picture_in() == Some(Duration::ZERO)
             && let Some(memory) = self.memory.take()
         {
-            let paint_secs = 1e-9 * self.painted.swap(0, Ordering::Relaxed) as f64;
+            let paint_secs = 1e-9 * self.handle.painted.swap(0, Ordering::Relaxed) as f64;
             self.render.send(Command::WantPicture { memory, paint_secs });
         }
     }
@@ -308,9 +314,12 @@ impl<W: Send + 'static> Hub<W> {
             return None;
         }
         let now = Instant::now();
-        let quiet = now.duration_since(self.acted_at) >= CALM_AFTER
-            && self.publisher.quiet_for(now) >= CALM_AFTER;
-        let pause = if quiet { CALM_INTERVAL } else { Duration::ZERO };
+        let idle = now.duration_since(self.acted_at);
+        let pause = match self.publisher.quiet_for(now) >= CALM_AFTER {
+            _ if idle < HURRIED_FOR => Duration::ZERO,
+            true if idle >= CALM_AFTER => CALM_INTERVAL,
+            _ => self.unhurried,
+        };
         Some((self.publisher.taken_at() + pause).saturating_duration_since(now))
     }
 
@@ -326,6 +335,11 @@ impl<W: Send + 'static> Hub<W> {
     }
 
     fn take(&mut self, picture: Picture) {
+        let bytes = self.handle.moved_bytes.swap(0, Ordering::Relaxed);
+        if bytes > 0 {
+            let wanted = Duration::from_secs_f64(bytes as f64 / UNHURRIED_BYTES_PER_SEC);
+            self.unhurried = wanted.min(LONGEST_UNHURRIED);
+        }
         self.hear_status(&picture.status);
         let new_input = self.inputs.shown_by(picture.mark);
         let taken = self.publisher.take(picture, self.inputs.shown(), new_input, Instant::now());

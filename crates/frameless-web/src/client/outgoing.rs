@@ -9,7 +9,7 @@ use crate::tiles::{self, Atlas, Published, SIDE, Seen};
 use crate::wire::{Codec, StatusMessage, TilesHeader};
 
 /// Before anything has been encoded, in bytes per tile: lossy, exact.
-const FIRST_GUESS: [f64; 2] = [500.0, 1500.0];
+const FIRST_GUESS: [f64; 2] = [130.0, 350.0];
 /// Of the newest message in what a tile is expected to take.
 const LEARNING_RATE: f64 = 0.2;
 /// While something moves, so much is refined per byte that is sent of what moves.
@@ -42,6 +42,8 @@ pub(super) struct Ready {
     pub(super) outgoing: Outgoing,
     pub(super) picture: Arc<Published>,
     pub(super) message: Option<Vec<u8>>,
+    /// Of what moves, and not of what is refined.
+    pub(super) moves: bool,
     /// The canvas is the picture, once everything before is drawn.
     pub(super) all_exact: bool,
     /// When to look again, if nothing changes before.
@@ -71,13 +73,7 @@ impl Outgoing {
         let chosen = self.seen.choose(&picture, now_ms, tiles, refine);
         let wait = chosen.wait_ms.map(|ms| Duration::from_millis(ms.into()));
         if chosen.tiles.is_empty() {
-            return Ready {
-                outgoing: self,
-                picture,
-                message: None,
-                all_exact: chosen.all_exact,
-                wait,
-            };
+            return self.nothing(picture, chosen.all_exact, wait);
         }
         let grid = picture.grid();
         let atlas =
@@ -85,7 +81,7 @@ impl Outgoing {
         let codec = if chosen.lossless { Codec::Png } else { Codec::Jpeg };
         // An encoder refuses no atlas; were it so, the tiles would be due again.
         let Ok(payload) = tiles::encode(codec, &atlas) else {
-            return Ready { outgoing: self, picture, message: None, all_exact: false, wait };
+            return self.nothing(picture, false, wait);
         };
         self.learn(chosen.lossless, chosen.tiles.len(), payload.len(), room.window);
         self.seen.sent(&picture, &chosen, now_ms);
@@ -104,7 +100,12 @@ impl Outgoing {
         };
         let message = Some(header.to_bytes(&payload));
         self.memory = atlas.rgb;
-        Ready { outgoing: self, picture, message, all_exact: false, wait }
+        let moves = !chosen.lossless;
+        Ready { outgoing: self, picture, message, moves, all_exact: false, wait }
+    }
+
+    fn nothing(self, picture: Arc<Published>, all_exact: bool, wait: Option<Duration>) -> Ready {
+        Ready { outgoing: self, picture, message: None, moves: false, all_exact, wait }
     }
 
     fn learn(&mut self, lossless: bool, tiles: usize, bytes: usize, window: usize) {

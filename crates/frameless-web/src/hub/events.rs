@@ -70,11 +70,18 @@ pub(crate) struct HubHandle {
     pub(crate) statuses: watch::Receiver<LoopStatus>,
     // Nanoseconds that showing the last picture has cost, all clients together.
     pub(super) painted: Arc<AtomicU64>,
+    // Bytes of the largest message since then of what moves.
+    pub(super) moved_bytes: Arc<AtomicU64>,
 }
 
 impl HubHandle {
     /// Choosing and encoding tiles took so long.
     pub(crate) fn painted(&self, took: Duration) {
         self.painted.fetch_add(took.as_nanos() as u64, Ordering::Relaxed);
+    }
+
+    /// A client is being sent so many bytes of what moves.
+    pub(crate) fn moved(&self, bytes: usize) {
+        self.moved_bytes.fetch_max(bytes as u64, Ordering::Relaxed);
     }
 }

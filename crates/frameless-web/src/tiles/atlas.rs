@@ -3,7 +3,7 @@
 use super::{Grid, SIDE};
 
 /// Tiles beside each other in an atlas: with many of them the atlas of a whole picture is about the picture.
-const COLUMNS: usize = 16;
+const COLUMNS: usize = 32;
 
 /// RGB, row-major.
 pub(crate) struct Atlas {
@@ -52,18 +52,18 @@ mod tests {
 
     #[test]
     fn tiles_lie_where_the_specification_says_and_are_padded() {
-        // 40×33: 2×2 tiles, all but the first cut.
-        let size = Size::new(40, 33);
+        // 24×17: 2×2 tiles, all but the first cut.
+        let size = Size::new(24, 17);
         let at = |x: u32, y: u32| [x as u8, y as u8, 7, 255];
         let rgba: Vec<_> =
-            (0..size.pixels() as u32).map(|pixel| at(pixel % 40, pixel / 40)).collect();
+            (0..size.pixels() as u32).map(|pixel| at(pixel % 24, pixel / 24)).collect();
         let atlas = Atlas::of(&Grid::new(size), &[3, 0], &rgba, vec![1; 5]);
-        assert_eq!((atlas.columns, atlas.width, atlas.height), (2, 64, 32));
-        let pixel = |x: usize, y: usize| &atlas.rgb[3 * (y * 64 + x)..][..3];
-        assert_eq!(pixel(0, 0), [32, 32, 7]);
-        assert_eq!(pixel(7, 0), [39, 32, 7]);
-        assert_eq!(pixel(31, 31), [39, 32, 7], "repeated");
-        assert_eq!(pixel(32, 0), [0, 0, 7]);
-        assert_eq!(pixel(63, 31), [31, 31, 7]);
+        assert_eq!((atlas.columns, atlas.width, atlas.height), (2, 32, 16));
+        let pixel = |x: usize, y: usize| &atlas.rgb[3 * (y * 32 + x)..][..3];
+        assert_eq!(pixel(0, 0), [16, 16, 7]);
+        assert_eq!(pixel(7, 0), [23, 16, 7]);
+        assert_eq!(pixel(15, 15), [23, 16, 7], "repeated");
+        assert_eq!(pixel(16, 0), [0, 0, 7]);
+        assert_eq!(pixel(31, 15), [15, 15, 7]);
     }
 }

@@ -6,6 +6,8 @@ mod flow;
 mod grid;
 mod publish;
 mod seen;
+#[cfg(test)]
+mod traffic;
 
 pub(crate) use atlas::Atlas;
 pub(crate) use codec::encode;

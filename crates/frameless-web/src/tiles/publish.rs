@@ -221,7 +221,7 @@ pub(crate) mod tests {
         Picture { size, rgba, mark: 0, status }
     }
 
-    const SIZE: Size = Size { width: 70, height: 40 };
+    const SIZE: Size = Size { width: 40, height: 20 };
 
     fn grey(level: u8) -> Picture {
         picture(SIZE, vec![[level, level, level, 255]; SIZE.pixels()])

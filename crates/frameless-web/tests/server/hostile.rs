@@ -1,11 +1,9 @@
 //! Messages that must not be.
 
-use std::time::Duration;
-
 use frameless_web::wire::{Ack, Said, StatusMessage, TilesHeader};
 use tokio_tungstenite::tungstenite::Message;
 
-use crate::support::{Client, Received, options, start};
+use crate::support::{Client, PATIENCE, Received, Running, options, start};
 
 /// Numbers from a seed (SplitMix64: Steele, Lea, Flood 2014).
 struct Numbers(u64);
@@ -95,15 +93,15 @@ fn ten_thousand_messages_do_not_break_the_parsers() {
     assert!((1000..9000).contains(&taken), "{taken} are good: both kinds are tried");
 }
 
-#[test]
-fn ten_thousand_messages_close_their_own_connections_only() {
-    let running = start(options());
-    let mut watcher = Client::connect(&running);
-    let mut numbers = Numbers(2);
-    let (mut sent, mut closed) = (0, 0);
-    while sent < 10_000 {
-        let mut client = Client::try_connect(&running).expect("let in");
-        loop {
+/// Sends messages until they are `most`, on a new connection wherever one has been closed. Returns how many it took.
+fn send_bad_and_good(running: &Running, seed: u64, most: usize) -> usize {
+    let mut numbers = Numbers(seed);
+    let (mut sent, mut connections) = (0, 0);
+    while sent < most {
+        let mut client = Client::try_connect(running).expect("let in");
+        client.draws = false;
+        connections += 1;
+        while sent < most {
             let message = message(&mut numbers);
             let is_good = match &message {
                 Message::Text(text) => Said::parse(text).is_ok(),
@@ -111,30 +109,48 @@ fn ten_thousand_messages_close_their_own_connections_only() {
                 _ => false,
             };
             sent += 1;
+            // Fails where the last message was bad and has been found so by now.
             client.socket.send(message).ok();
-            if !is_good || sent >= 10_000 {
-                closed += 1;
-                let last = loop {
-                    match client.receive(Duration::from_secs(10)) {
-                        Received::Closed(code) => break code,
-                        Received::Nothing if sent >= 10_000 => break None,
-                        Received::Nothing => panic!("still open after a bad message"),
-                        _ => {}
-                    }
-                };
-                assert!(last.is_none_or(|code| code == 1008), "{last:?}");
+            if !is_good {
+                let code = closing_code(&mut client);
+                assert!(code.is_none_or(|code| code == 1008), "{code:?}");
                 break;
             }
         }
-        // The other one is served all the while.
-        if closed % 10 == 0 {
-            watcher.until("a status", |_, received| {
-                matches!(received, Received::Status(_)).then_some(())
-            });
+    }
+    connections
+}
+
+fn closing_code(client: &mut Client) -> Option<u16> {
+    loop {
+        match client.receive(PATIENCE) {
+            Received::Closed(code) => return code,
+            Received::Nothing => panic!("still open after a bad message"),
+            _ => {}
         }
     }
-    println!("{sent} messages on {closed} connections");
-    watcher.until("tiles", |_, received| matches!(received, Received::Status(_)).then_some(()));
+}
+
+#[test]
+fn ten_thousand_messages_close_their_own_connections_only() {
+    const CLIENTS: u64 = 16;
+    let running = start(options());
+    let mut watcher = Client::connect(&running);
+    let connections: usize = std::thread::scope(|scope| {
+        let running = &running;
+        let client =
+            |seed| scope.spawn(move || send_bad_and_good(running, seed, 10_000 / CLIENTS as usize));
+        let clients: Vec<_> = (1..=CLIENTS).map(client).collect();
+        // Somebody else is served all the while.
+        while clients.iter().any(|client| !client.is_finished()) {
+            watcher.next();
+        }
+        clients.into_iter().map(|client| client.join().expect("no surprise")).sum()
+    });
+    println!("10,000 messages on {connections} connections");
+    let alive =
+        |_: &mut Client, received: &Received| matches!(received, Received::Status(_)).then_some(());
+    watcher.until("a status", alive);
 }
 
 #[test]
@@ -143,13 +159,6 @@ fn a_message_that_is_too_long_ends_its_connection() {
     let mut other = Client::connect(&running);
     let mut client = Client::connect(&running);
     client.socket.send(Message::text(" ".repeat((1 << 20) + 1))).ok();
-    let code = loop {
-        match client.receive(Duration::from_secs(10)) {
-            Received::Closed(code) => break code,
-            Received::Nothing => panic!("still open"),
-            _ => {}
-        }
-    };
-    assert_eq!(code, Some(1009));
+    assert_eq!(closing_code(&mut client), Some(1009));
     other.until("a status", |_, received| matches!(received, Received::Status(_)).then_some(()));
 }

@@ -55,8 +55,8 @@ fn what_moves_is_sent_first_and_not_all_of_it() {
     let end = Instant::now() + Duration::from_secs(4);
     while Instant::now() < end {
         if let Received::Tiles(header) = client.next() {
-            all += usize::from(header.tiles.len() == 48);
-            few += usize::from(header.tiles.len() < 48);
+            all += usize::from(header.tiles.len() == 192);
+            few += usize::from(header.tiles.len() < 192);
         }
     }
     assert!(few > 10, "{few} messages of some tiles, {all} of all");

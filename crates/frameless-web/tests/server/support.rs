@@ -152,6 +152,8 @@ pub(crate) enum Received {
     Json(Value),
     /// The connection has ended, with this code if it said why.
     Closed(Option<u16>),
+    /// Something binary, to a client that does not draw.
+    Unread,
     /// Nothing within the time.
     Nothing,
 }
@@ -162,6 +164,8 @@ pub(crate) struct Client {
     pub(crate) canvas: RgbImage,
     pub(crate) number: u32,
     pub(crate) bytes: usize,
+    /// Whether it looks at what it is sent.
+    pub(crate) draws: bool,
     generation: u32,
     sequence: u32,
 }
@@ -206,7 +210,7 @@ impl Client {
             }
         };
         let canvas = RgbImage::new(1, 1);
-        Ok(Client { socket, canvas, number: 0, bytes: 0, generation: 0, sequence: 0 })
+        Ok(Client { socket, canvas, number: 0, bytes: 0, draws: true, generation: 0, sequence: 0 })
     }
 
     pub(crate) fn say(&mut self, json: &str) {
@@ -230,6 +234,7 @@ impl Client {
                 Ok(Message::Binary(bytes)) => {
                     self.bytes += bytes.len() + 4;
                     return match bytes[0] {
+                        _ if !self.draws => Received::Unread,
                         1 => Received::Tiles(self.draw(&bytes)),
                         2 => Received::Status(StatusMessage::parse(&bytes).expect("a status")),
                         other => panic!("a message of type {other}"),
