@@ -69,7 +69,8 @@ fn show(look: &LookArgs) -> Result<Show<CpuTracer>, Failure> {
     let tracer = CpuTracer::new(prepare(&scene), camera, look.light.settings(), look.threads);
     let size = settings.picture.size_in(FIRST_PLACE);
     Ok(Show {
-        session: Session::new(size, Clock::real(), settings, look.seed, tracer),
+        session: Session::new(size, Clock::real(), settings, look.seed, tracer)
+            .with_refresh_threads(look.threads),
         helm: Helm::new(scene),
         scenes: Some(Scenes { limits: Limits::default(), prepare: Arc::new(prepare) }),
     })

@@ -3,7 +3,8 @@
 //! The display's rate where both are cheap. Where painting is not (software rendering on few cores takes 10 ms and
 //! more), a fixed share of one core: what the window takes, the picture loses. Where making the picture of the samples is
 //! not, a fixed share of the render loop's time: no samples come meanwhile, and a slow refresh should lower the rate of
-//! pictures rather than that of samples.
+//! pictures rather than that of samples. An answer to somebody who has just done something is made at once, on credit: what
+//! rest that costs the samples is owed, and once too much is owed the next picture waits.
 
 use frameless::Time;
 
@@ -13,6 +14,8 @@ pub struct Pace {
     due: Time,
     // When the next one might be, if somebody waits for it.
     soonest: Time,
+    // Until when the samples would have the loop for themselves if nothing were on credit.
+    owed_until: Time,
     paint_secs: f64,
 }
 
@@ -24,8 +27,10 @@ const LONGEST_SECS: f64 = 1.0 / 20.0;
 const PAINT_SHARE: f64 = 0.25;
 // Of the loop's time, for making pictures. More starves the samples of which they are made.
 const REFRESH_SHARE: f64 = 1.0 / 3.0;
-// The same where a user has just done something and looks for the answer.
+// The same where a user goes on doing something and looks for the answers.
 const HURRIED_SHARE: f64 = 0.5;
+// Of the rest that the samples are owed, so much may be put off: two or three refreshes of a window.
+const CREDIT_SECS: f64 = 0.04;
 // Whatever a picture costs, the next comes after this at the latest.
 const LONGEST_REST_SECS: f64 = 1.0;
 // Of the newest paint in the learned cost: one slow paint is no reason to slow down.
@@ -42,12 +47,16 @@ impl Pace {
     /// Told when a picture is ready, and what making it cost in seconds of the render loop. The samples get their share before
     /// the next one: at once and not on average, since the first pictures of a large window cost most.
     pub fn made(&mut self, now: Time, refresh_secs: f64) {
-        let rested = |share: f64| {
+        let rested = |from: Time, share: f64| {
             let rest_secs = refresh_secs * (1.0 / share - 1.0);
-            Time::from_secs(now.secs() + rest_secs.min(LONGEST_REST_SECS))
+            Time::from_secs(from.secs() + rest_secs.min(LONGEST_REST_SECS))
         };
-        self.soonest = self.soonest.max(rested(HURRIED_SHARE));
-        self.due = self.due.max(rested(REFRESH_SHARE));
+        // Nothing was paid back while this one was made.
+        let owed_until = Time::from_secs(self.owed_until.secs() + refresh_secs);
+        self.owed_until = rested(owed_until.max(now), HURRIED_SHARE);
+        let on_credit = Time::from_secs(self.owed_until.secs() - CREDIT_SECS);
+        self.soonest = self.soonest.max(on_credit);
+        self.due = self.due.max(rested(now, REFRESH_SHARE));
     }
 
     /// Told when somebody has done something: the next picture shows it, and may come a little earlier than it would.
@@ -99,21 +108,48 @@ mod tests {
         assert_eq!(pace.interval_secs(), LONGEST_SECS);
     }
 
+    const fn ms(ms: u64) -> Time {
+        Time(ms * 1_000_000)
+    }
+
     #[test]
-    fn whoever_has_done_something_waits_for_half_of_the_loop_at_most() {
-        let ms = |ms: u64| Time(ms * 1_000_000);
+    fn whoever_has_done_something_is_answered_at_once() {
         let mut pace = Pace::default();
         assert!(pace.is_due(ms(1000)));
         pace.made(ms(1030), 0.03);
-        assert!(!pace.is_due(ms(1061)));
+        assert!(!pace.is_due(ms(1031)));
         pace.hurry();
-        assert!(!pace.is_due(ms(1059)));
+        assert!(pace.is_due(ms(1031)));
+        // That was on credit: the next has to wait until all but the credit is paid back.
+        pace.made(ms(1061), 0.03);
+        pace.hurry();
+        assert!(!pace.is_due(ms(1079)));
+        assert!(pace.is_due(ms(1082)));
+    }
+
+    #[test]
+    fn a_cheap_picture_comes_at_the_displays_rate_hurried_or_not() {
+        let mut pace = Pace::default();
         assert!(pace.is_due(ms(1061)));
-        // A cheap picture comes at the display's rate, hurried or not.
         pace.made(ms(1062), 0.001);
         pace.hurry();
         assert!(!pace.is_due(ms(1075)));
         assert!(pace.is_due(ms(1077)));
+    }
+
+    #[test]
+    fn whoever_goes_on_doing_something_gets_half_of_the_loop() {
+        let (mut pace, mut now, mut made) = (Pace::default(), Time::from_secs(1.0), 0);
+        while now < Time::from_secs(4.0) {
+            now.0 += 1_000_000;
+            pace.hurry();
+            if pace.is_due(now) {
+                now.0 += 20_000_000;
+                pace.made(now, 0.02);
+                made += 1;
+            }
+        }
+        assert!((73..=78).contains(&made), "{made} × 20 ms of 3 s");
     }
 
     #[test]

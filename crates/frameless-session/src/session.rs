@@ -49,6 +49,14 @@ impl<S: Stage> Session<S> {
         Session { engine, settings, seed, held, heat_maps, throughput, mark: 0 }
     }
 
+    /// Make pictures with so many threads; 0: one per core. One, unless this is called.
+    pub fn with_refresh_threads(mut self, threads: usize) -> Self {
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        let threads = if threads == 0 { cores() } else { threads };
+        self.engine.set_refresh_threads(threads.min(MOST_REFRESH_THREADS));
+        self
+    }
+
     /// One turn of the loop.
     pub fn step(&mut self) -> Result<usize, EngineError> {
         let outcome = self.engine.step();
@@ -170,6 +178,8 @@ impl<S: Stage> Session<S> {
     }
 }
 
+// Starting more takes longer than they save.
+const MOST_REFRESH_THREADS: usize = 8;
 // One sample in 8×8 pixels is a sketch of the picture.
 const PIXELS_PER_FIRST_SAMPLE: u64 = 64;
 // For renderers that need longer.

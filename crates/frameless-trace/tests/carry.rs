@@ -139,6 +139,22 @@ fn rmse(a: &[[f32; 3]], b: &[[f32; 3]]) -> f32 {
 }
 
 #[test]
+fn any_number_of_threads_makes_the_same_picture() {
+    let world = world("shadow");
+    let play = |threads: usize| {
+        let mut engine = engine(&world, view(Vec3::new(0.0, 1.0, 6.0), 0.0), 80_000.0);
+        engine.set_reconstruction(ReconstructionKind::default().build());
+        engine.set_refresh_threads(threads);
+        let at = |k: u64| view(Vec3::new(0.02 * k as f32, 1.0, 6.0), 0.01 * k as f32);
+        let pictures = (1..=20).map(|k| play(&mut engine, k, at(k))).collect::<Vec<_>>();
+        (pictures, engine.canvas().holes().to_vec())
+    };
+    let alone = play(1);
+    assert!(alone.0[5] != alone.0[19] && !alone.1.is_empty());
+    assert!(alone == play(2) && alone == play(7));
+}
+
+#[test]
 fn objects_may_come_through_the_camera() {
     // Through the scene from front to back, within blocks and spheres on the way.
     let world = world("orbit");

@@ -72,7 +72,8 @@ impl App {
             options.threads,
         );
         let size = settings.picture.size_in(options.window.map(|side| side as u32));
-        let session = Session::new(size, Clock::real(), settings, options.seed, tracer);
+        let session = Session::new(size, Clock::real(), settings, options.seed, tracer)
+            .with_refresh_threads(options.threads);
         let window = context.egui_ctx.clone();
         let render = RenderThread::start(session, move || window.request_repaint())?;
         render.send(Command::WantPicture { memory: Vec::new(), paint_secs: 0.0 });

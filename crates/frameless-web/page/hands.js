@@ -25,7 +25,8 @@ export class Hands {
     [this.#canvas, this.#move] = [canvas, move];
     const on = (name, handler) => canvas.addEventListener(name, handler.bind(this), { passive: false });
     on("pointerdown", this.#down);
-    on("pointermove", this.#moved);
+    // Moves as they happen, where the browser tells: others wait for its next refresh.
+    on("onpointerrawupdate" in window ? "pointerrawupdate" : "pointermove", this.#moved);
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) on(end, this.#up);
     on("wheel", this.#wheel);
     on("contextmenu", (event) => event.preventDefault());

@@ -28,6 +28,7 @@ pub struct Engine<T> {
     pose: Pose,
     lighting: Lighting,
     picture: Vec<[f32; 3]>,
+    refresh_threads: usize,
 }
 
 /// The samples of one answer and what they took the place of, in the answer's order.
@@ -140,6 +141,7 @@ impl<T: Tracer> Engine<T> {
             pose: Pose::default(),
             lighting: Lighting::default(),
             picture: Vec::new(),
+            refresh_threads: 1,
         }
     }
 
@@ -362,7 +364,16 @@ impl<T: Tracer> Engine<T> {
         let rates = self.sampler.rates().filter(|rates| rates.size() == size);
         let (display, is_noisy) = (&self.display, self.tracer.is_noisy());
         let wants_motion = self.sampler.wants_motion();
-        let refresh = Refresh { now, pose, lighting, display, is_noisy, rates, wants_motion };
+        let refresh = Refresh {
+            now,
+            pose,
+            lighting,
+            display,
+            is_noisy,
+            rates,
+            wants_motion,
+            threads: self.refresh_threads,
+        };
         self.reconstruction.refresh(&refresh, &mut self.canvas, picture);
     }
 
@@ -492,6 +503,12 @@ impl<T: Tracer> Engine<T> {
         if let Clock::Real(clock) = &mut self.clock {
             clock.set_budget(samples_per_sec);
         }
+    }
+
+    /// Make pictures with so many threads; 1 at first. For who shows pictures while nothing else is to be done: no samples are
+    /// chosen meanwhile.
+    pub fn set_refresh_threads(&mut self, threads: usize) {
+        self.refresh_threads = threads.max(1);
     }
 
     /// Go on in another size with the same picture, resampled. Batches under way are dropped when they come.

@@ -26,6 +26,7 @@
 //! ```
 
 mod alias;
+mod bands;
 mod batch_length;
 mod bayer;
 mod bilinear;

@@ -14,8 +14,9 @@ const FIRST_GUESS: [f64; 2] = [130.0, 350.0];
 const LEARNING_RATE: f64 = 0.2;
 /// While something moves, so much is refined per byte that is sent of what moves.
 const REFINE_SHARE: f64 = 0.25;
-/// While something moves, the largest refinement in bytes: what moves waits for it.
-const MOST_REFINED: usize = 16 << 10;
+/// The largest message in bytes while something moves: what moved most is on the page while the rest of the picture is still being
+/// encoded, and waits for no large refinement.
+const LARGEST_MOVING: usize = 16 << 10;
 
 /// What a client has been sent, and what that took. Passed to a thread and back for every message.
 pub(super) struct Outgoing {
@@ -64,11 +65,8 @@ impl Outgoing {
     /// Chooses and encodes.
     pub(super) fn make(mut self, picture: Arc<Published>, room: &Room) -> Ready {
         let now_ms = self.begun.elapsed().as_millis() as u32 + 1;
-        let exact_bytes = if picture.calm { room.bytes } else { room.bytes.min(MOST_REFINED) };
-        let tiles = [
-            (room.bytes as f64 / self.cost[0]) as usize,
-            (exact_bytes as f64 / self.cost[1]) as usize,
-        ];
+        let bytes = if picture.calm { room.bytes } else { room.bytes.min(LARGEST_MOVING) };
+        let tiles = self.cost.map(|cost| (bytes as f64 / cost) as usize);
         let refine = self.credit >= self.cost[1];
         let chosen = self.seen.choose(&picture, now_ms, tiles, refine);
         let wait = chosen.wait_ms.map(|ms| Duration::from_millis(ms.into()));

@@ -21,8 +21,10 @@ const LEAST: usize = 32 << 10;
 /// More than a picture of any size allowed takes.
 const MOST: usize = 4 << 20;
 const REFRESH_SECS: f64 = 1.0 / 60.0;
-/// Beyond those that the round trip asks for at 60 per second: one being drawn, one waiting.
-const SPARE_MESSAGES: usize = 2;
+/// A picture's tiles go in this many messages at most.
+const MESSAGES_PER_PICTURE: usize = 6;
+/// Beyond those that the round trip asks for at 60 pictures per second: one being drawn, one waiting.
+const SPARE_PICTURES: usize = 1;
 const GAIN: f64 = 1.25;
 const RATE_MEMORY: Duration = Duration::from_secs(2);
 const RTT_MEMORY: Duration = Duration::from_secs(10);
@@ -69,8 +71,8 @@ impl Flow {
 
     /// Bytes that may be sent now; 0: wait for an acknowledgement.
     pub(crate) fn room(&self) -> usize {
-        let most_messages = (self.rtt.secs / REFRESH_SECS).ceil() as usize + SPARE_MESSAGES;
-        if self.sent.len() >= most_messages {
+        let most_pictures = (self.rtt.secs / REFRESH_SECS).ceil() as usize + SPARE_PICTURES;
+        if self.sent.len() >= most_pictures * MESSAGES_PER_PICTURE {
             return 0;
         }
         self.window().saturating_sub(self.in_flight)

@@ -56,6 +56,8 @@ pub struct Refresh<'a> {
     pub rates: Option<&'a Rates>,
     /// Whether the sampler wants to know [`Canvas::tile_motion`].
     pub wants_motion: bool,
+    /// How many threads may work on the picture; it is the same with any number.
+    pub threads: usize,
 }
 
 /// Makes pictures of samples.

@@ -12,6 +12,7 @@
 use super::fill::{self, AROUND};
 use super::holes::{Hole, Waiting};
 use super::store::{EMPTY, Layout, Store, TICK_SECS, Tick, centres, distance2};
+use crate::bands;
 use crate::rates::Rates;
 use crate::wide::{self, F8, M8, Planes, Unit};
 use crate::{Size, Time};
@@ -30,6 +31,15 @@ pub(super) struct Gather {
     source: Vec<u32>,
     /// Holes that are not beside samples.
     far: Vec<u32>,
+    /// Of each band of rows.
+    found: Vec<Found>,
+}
+
+/// What was found in a band of rows.
+#[derive(Default)]
+struct Found {
+    waiting: Waiting,
+    far: Vec<u32>,
 }
 
 /// Below this expected error a sample is taken as it is.
@@ -44,14 +54,17 @@ impl Gather {
             waiting: Waiting::default(),
             source: Vec::new(),
             far: Vec::new(),
+            found: Vec::new(),
         }
     }
 
     /// `contrast` per tile of `rates`, whose tiles are eight pixels wide; `shown`: the picture if nothing is known.
+    #[expect(clippy::too_many_arguments)]
     pub(super) fn run(
         &mut self,
         store: &Store,
         now: Time,
+        threads: usize,
         rates: &Rates,
         contrast: &[f32],
         shown: &[[f32; 3]],
@@ -73,9 +86,29 @@ impl Gather {
             rates,
             contrast,
         };
-        let cells = Cells::new(&store.layout);
-        wide::run(Blocks { model, cells: &cells, now, picture, gather: self });
-        self.fill_far(store.layout.size, shown, picture);
+        let cells = &Cells::new(&store.layout);
+        let size = store.layout.size;
+        let rows = bands::rows(size.height, threads);
+        let band = rows as usize * size.width as usize;
+        self.found.resize_with(size.height.div_ceil(rows) as usize, Found::default);
+        let means = self.means;
+        let bands = picture
+            .chunks_mut(band)
+            .zip(self.known.chunks_mut(band))
+            .zip(self.time.chunks_mut(band))
+            .zip(self.source.chunks_mut(band))
+            .zip(&mut self.found)
+            .zip((0..size.height).step_by(rows as usize));
+        let bands = bands.map(|(((((picture, known), time), source), found), first_row)| {
+            let first = size.index(0, first_row);
+            Blocks { model, cells, now, means, first, picture, known, time, source, found }
+        });
+        bands::run(threads, bands.collect(), wide::run);
+        for found in &mut self.found {
+            self.waiting.append(&mut found.waiting);
+            self.far.append(&mut found.far);
+        }
+        self.fill_far(size, shown, picture);
     }
 
     fn fill_far(&mut self, size: Size, shown: &[[f32; 3]], picture: &mut [[f32; 3]]) {
@@ -169,13 +202,20 @@ struct Model<'a> {
     contrast: &'a [f32],
 }
 
-/// All pixels, eight at a time.
+/// The pixels of a band of rows, eight at a time.
 struct Blocks<'a> {
     model: Model<'a>,
     cells: &'a Cells,
     now: Time,
+    means: bool,
+    /// The band's first pixel.
+    first: u32,
+    /// Of the band's pixels, as all below.
     picture: &'a mut [[f32; 3]],
-    gather: &'a mut Gather,
+    known: &'a mut [bool],
+    time: &'a mut [Time],
+    source: &'a mut [u32],
+    found: &'a mut Found,
 }
 
 /// Eight pixels in a row of one tile.
@@ -204,7 +244,8 @@ impl wide::Task for Blocks<'_> {
     fn run<U: Unit>(mut self) {
         let size = self.model.store.layout.size;
         let columns = self.model.rates.grid.columns;
-        for y in 0..size.height {
+        let (first, rows) = (self.first / size.width, self.picture.len() as u32 / size.width);
+        for y in first..first + rows {
             for x in (0..size.width).step_by(8) {
                 self.block::<U>(x, y, (y / 8 * columns + x / 8) as usize);
             }
@@ -230,7 +271,7 @@ impl Blocks<'_> {
         if holes.any() {
             seen.object = self.model.nearest(&eight, self.cells).or(holes, seen.object);
         }
-        let exact = match self.gather.means {
+        let exact = match self.means {
             true => seen.error.less_than(F8::splat(EXACT)),
             false => holes.not(),
         };
@@ -238,20 +279,21 @@ impl Blocks<'_> {
             let mean = self.model.mean(&eight, self.cells, seen.object, holes);
             seen.rgb = F8::all_or(seen.rgb, exact, mean);
         }
-        let start = size.index(x, y) as usize;
+        let start = size.index(x, y);
         let [r, g, b] = seen.rgb;
         let rgb = [r.lanes(), g.lanes(), b.lanes()];
         let (ticks, are_holes) = (seen.tick.lanes(), holes.bits());
-        let pixels = start..start + lanes;
+        let in_band = (start - self.first) as usize;
+        let pixels = in_band..in_band + lanes;
         let picture = &mut self.picture[pixels.clone()];
-        let known = &mut self.gather.known[pixels.clone()];
-        let time = &mut self.gather.time[pixels.clone()];
-        let source = &mut self.gather.source[pixels];
+        let known = &mut self.known[pixels.clone()];
+        let time = &mut self.time[pixels.clone()];
+        let source = &mut self.source[pixels];
         for lane in 0..lanes {
             picture[lane] = [rgb[0][lane], rgb[1][lane], rgb[2][lane]];
             known[lane] = are_holes & (1 << lane) == 0;
             time[lane] = Tick(ticks[lane]).time(self.now);
-            source[lane] = (start + lane) as u32;
+            source[lane] = start + lane as u32;
         }
         if holes.any() {
             self.note_holes(&eight, holes, x, y);
@@ -275,17 +317,18 @@ impl Blocks<'_> {
         holes.for_each(|lane| {
             let x = x + lane as u32;
             let pixel = size.index(x, y);
+            let in_band = (pixel - self.first) as usize;
             let hole = if known[lane] as i32 <= -4 { Hole::Small } else { Hole::Large };
-            self.gather.waiting.push(pixel, x, y, hole);
+            self.found.waiting.push(pixel, x, y, hole);
             let Some([dx, dy]) = AROUND.get(nearest[lane] as usize) else {
-                self.gather.source[pixel as usize] = fill::NOBODY;
-                self.gather.far.push(pixel);
+                self.source[in_band] = fill::NOBODY;
+                self.found.far.push(pixel);
                 return;
             };
             let (x, y) = (x.wrapping_add_signed(*dx), y.wrapping_add_signed(*dy));
-            self.gather.source[pixel as usize] = size.index(x, y);
+            self.source[in_band] = size.index(x, y);
             if let Some(i) = store.newest(x, y) {
-                self.gather.time[pixel as usize] = Tick(store.tick[i]).time(self.now);
+                self.time[in_band] = Tick(store.tick[i]).time(self.now);
             }
         });
     }

@@ -48,6 +48,11 @@ impl Waiting {
         self.found.push((pixel, hole as u8 * RANKS as u8 + rank));
     }
 
+    /// What others found after these.
+    pub(super) fn append(&mut self, later: &mut Waiting) {
+        self.found.append(&mut later.found);
+    }
+
     /// The most urgent first; those of one class in the order in which they were found (counting sort).
     pub(super) fn order(&self, ordered: &mut Vec<u32>) {
         let mut next = [0; CLASSES];

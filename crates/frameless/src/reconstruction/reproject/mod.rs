@@ -227,7 +227,7 @@ impl Reproject {
             self.settled.encode_again(&display);
         }
         if let Some(lighting) = refresh.lighting {
-            self.relight.run(&mut self.store, lighting, &display);
+            self.relight.run(&mut self.store, lighting, &display, refresh.threads);
         }
     }
 
@@ -241,7 +241,9 @@ impl Reproject {
             self.shown = canvas.rgb().iter().map(|&rgb| refresh.display.encode(rgb)).collect();
         }
         tile_contrast(&self.shown, &rates.grid, &mut self.contrast);
-        self.gather.run(&self.store, refresh.now, rates, &self.contrast, &self.shown, picture);
+        let (now, threads) = (refresh.now, refresh.threads);
+        let (store, contrast) = (&self.store, &self.contrast);
+        self.gather.run(store, now, threads, rates, contrast, &self.shown, picture);
         let recentres = self.options.without != Some(ReprojectStage::Recentre);
         if recentres && self.settled.any_rests() {
             self.gather.find_off_centre(&self.store, |object| self.settled.rests(object));

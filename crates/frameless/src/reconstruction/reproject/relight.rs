@@ -7,7 +7,7 @@
 //! What the object emits and reflects, and ambient light, stay as they were until the pixel is traced again; so do shadows.
 
 use super::store::{EMPTY, Sample, Shade, Store};
-use crate::{Display, Light, Lighting, Surface};
+use crate::{Display, Light, Lighting, Surface, bands};
 
 /// The lights under which the stored samples are shown.
 #[derive(Default)]
@@ -62,7 +62,13 @@ impl Relight {
     }
 
     /// Shows all samples of objects for which something has changed under the new lights.
-    pub(super) fn run(&mut self, store: &mut Store, lighting: &Lighting, display: &Display) {
+    pub(super) fn run(
+        &mut self,
+        store: &mut Store,
+        lighting: &Lighting,
+        display: &Display,
+        threads: usize,
+    ) {
         self.moved = moved(&lighting.lights, &self.shown.lights);
         let everything = lighting.lights != self.shown.lights;
         let then = &self.shown.world_from_object;
@@ -74,7 +80,7 @@ impl Relight {
         self.any_changed = self.changed.contains(&true);
         if self.any_changed {
             self.shown.clone_from(lighting);
-            self.shade(store, display);
+            self.shade(store, display, threads);
         }
     }
 
@@ -103,10 +109,24 @@ impl Relight {
         }
     }
 
-    fn shade(&self, store: &mut Store, display: &Display) {
+    fn shade(&self, store: &mut Store, display: &Display, threads: usize) {
+        let band = store.layout.len().div_ceil(bands::PER_THREAD * threads);
+        let mut colours = std::mem::take(&mut store.rgb);
+        let [red, green, blue] = colours.each_mut().map(|plane| plane.chunks_mut(band));
+        let chunks = red.zip(green).zip(blue).map(|((red, green), blue)| [red, green, blue]);
+        let shaded = &*store;
+        bands::run(threads, chunks.enumerate().collect(), |(nth, rgb)| {
+            self.shade_cells(shaded, nth * band, rgb, display);
+        });
+        store.rgb = colours;
+    }
+
+    /// The cells from `first` on, whose display-referred colours are `rgb`.
+    fn shade_cells(&self, store: &Store, first: usize, rgb: [&mut [f32]; 3], display: &Display) {
         let mut before = (EMPTY, false);
-        for i in 0..store.layout.len() {
-            let object = store.object[i];
+        for at in 0..rgb[0].len() {
+            let cell = first + at;
+            let object = store.object[cell];
             // Neighbours are mostly of the same object.
             if object != before.0 {
                 before = (object, self.has_changed(object));
@@ -114,9 +134,9 @@ impl Relight {
             if !before.1 {
                 continue;
             }
-            if let Some(rgb) = store.shade(i).relit(&store.surface(i), &self.shown) {
-                let rgb = display.encode(rgb);
-                (0..3).for_each(|k| store.rgb[k][i] = rgb[k]);
+            if let Some(linear) = store.shade(cell).relit(&store.surface(cell), &self.shown) {
+                let encoded = display.encode(linear);
+                (0..3).for_each(|k| rgb[k][at] = encoded[k]);
             }
         }
     }
