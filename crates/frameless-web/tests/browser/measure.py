@@ -98,7 +98,7 @@ def latency_at_rest(bench: Bench) -> dict:
     measured = []
     with bench.server() as server, bench.view(server) as view:
         view.pause()
-        for turn in range(max(5, int(bench.secs(40)))):
+        for turn in range(max(5, int(bench.secs(15)))):
             view.exact(60)
             measured.append(view.page.evaluate(FIRST_PIXEL, [1 if turn % 2 else -1]))
     p50, p99 = percentiles(measured, 50, 99)

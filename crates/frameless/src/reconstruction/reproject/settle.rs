@@ -223,8 +223,8 @@ impl Settled {
         refresh: &Refresh<'_>,
         picture: &mut [[f32; 3]],
     ) {
-        if !self.any_rests() && !self.count.iter().any(|&n| n > 0) {
-            return;
+        if !self.any_rests() && !refresh.is_noisy {
+            return self.count.fill(0);
         }
         self.find_moving(store);
         wide::run(Show { settled: self, store, relight, refresh, picture });
