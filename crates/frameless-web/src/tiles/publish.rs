@@ -1,7 +1,7 @@
 //! Pictures as the clients see them: only those in which something changed, with what changed in them.
 //!
 //! What rests is refined for seconds by differences that nobody sees. Were each of those pictures published, no client would ever have
-//! *the* picture: so a picture in which no change can be seen is published only twice a second.
+//! *the* picture: so a picture in which no change can be seen is published only twice a second, or once it is the same twice.
 
 use std::hash::{BuildHasher, Hasher};
 use std::sync::{Arc, OnceLock};
@@ -80,13 +80,15 @@ pub(crate) enum Taken {
 pub(crate) struct Publisher {
     last: Option<Arc<Published>>,
     taken_at: Instant,
+    // Of the last picture, published or not.
+    taken: u64,
     published_at: Instant,
     seen_at: Instant,
 }
 
 impl Publisher {
     pub(crate) fn new(now: Instant) -> Publisher {
-        Publisher { last: None, taken_at: now, published_at: now, seen_at: now }
+        Publisher { last: None, taken_at: now, taken: 0, published_at: now, seen_at: now }
     }
 
     /// When the last picture came, published or not.
@@ -108,6 +110,8 @@ impl Publisher {
         now: Instant,
     ) -> Taken {
         self.taken_at = now;
+        let digest_of_all = digest_of([picture.rgba.as_flattened()]);
+        let stands_still = std::mem::replace(&mut self.taken, digest_of_all) == digest_of_all;
         let other_size = self.last.take_if(|last| last.size != picture.size);
         let generation = match (&self.last, other_size) {
             (Some(last), _) => last.generation,
@@ -131,7 +135,7 @@ impl Publisher {
             self.seen_at = now;
         }
         let due = now.duration_since(self.published_at) >= UNSEEN_INTERVAL;
-        if !(is_seen || differs && (due || new_input)) {
+        if !(is_seen || differs && (due || new_input || stands_still)) {
             return Taken::Same(picture.rgba);
         }
         let (mut digests, mut change_sums) = (last.digests.clone(), last.change_sums.clone());
@@ -199,8 +203,12 @@ fn difference(grid: &Grid, tile: usize, before: &[[u8; 4]], after: &[[u8; 4]]) -
 }
 
 fn digest(grid: &Grid, tile: usize, rgba: &[[u8; 4]]) -> u64 {
+    digest_of(grid.rows(tile).map(|row| rgba[row].as_flattened()))
+}
+
+fn digest_of<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> u64 {
     let mut hasher = FixedState::with_seed(0).build_hasher();
-    grid.rows(tile).for_each(|row| hasher.write(rgba[row].as_flattened()));
+    parts.into_iter().for_each(|part| hasher.write(part));
     hasher.finish()
 }
 
@@ -262,10 +270,30 @@ pub(crate) mod tests {
             picture.rgba[7] = [11, 10, 10, 255];
             picture
         };
+        let other_step = || {
+            let mut picture = one_step();
+            picture.rgba[9] = [11, 10, 10, 255];
+            picture
+        };
         let at = |ms| now + Duration::from_millis(ms);
         assert!(matches!(publisher.take(one_step(), Vec::new(), false, at(100)), Taken::Same(_)));
-        let shown = published(publisher.take(one_step(), Vec::new(), false, at(510)));
+        let shown = published(publisher.take(other_step(), Vec::new(), false, at(510)));
         assert!(shown.calm);
+    }
+
+    #[test]
+    fn what_stands_still_is_published_at_once() {
+        let now = Instant::now();
+        let mut publisher = Publisher::new(now);
+        published(publisher.take(grey(10), Vec::new(), false, now));
+        let mut one_step = || {
+            let mut picture = grey(10);
+            picture.rgba[7] = [11, 10, 10, 255];
+            publisher.take(picture, Vec::new(), false, now)
+        };
+        assert!(matches!(one_step(), Taken::Same(_)));
+        published(one_step());
+        assert!(matches!(one_step(), Taken::Same(_)), "nothing differs any longer");
     }
 
     #[test]

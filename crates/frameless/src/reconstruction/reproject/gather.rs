@@ -9,6 +9,8 @@
 //! the mean of those around that belong to the nearest one's object, farther away what the nearest pixel shows that is no hole
 //! ([`fill`](super::fill)).
 
+use std::ops::Range;
+
 use super::fill::{self, AROUND};
 use super::holes::{Hole, Waiting};
 use super::store::{EMPTY, Layout, Store, TICK_SECS, Tick, centres, distance2};
@@ -124,23 +126,37 @@ impl Gather {
     }
 
     /// After a picture: samples beside their pixel's centre are to be traced again, where their object `rests`.
-    pub(super) fn find_off_centre(&mut self, store: &Store, rests: impl Fn(u32) -> bool) {
-        wide::run(OffCentre { store, rests, waiting: &mut self.waiting });
+    pub(super) fn find_off_centre(
+        &mut self,
+        store: &Store,
+        threads: usize,
+        rests: impl Fn(u32) -> bool + Sync,
+    ) {
+        let height = store.layout.size.height;
+        let band = bands::rows(height, threads);
+        let firsts = (0..height).step_by(band as usize);
+        let bands = self.found.iter_mut().zip(firsts).map(|(found, first)| {
+            let rows = first..(first + band).min(height);
+            OffCentre { store, rows, rests: &rests, waiting: &mut found.waiting }
+        });
+        bands::run(threads, bands.collect(), wide::run);
+        self.found.iter_mut().for_each(|found| self.waiting.append(&mut found.waiting));
     }
 }
 
 struct OffCentre<'a, F> {
     store: &'a Store,
-    rests: F,
+    rows: Range<u32>,
+    rests: &'a F,
     waiting: &'a mut Waiting,
 }
 
 impl<F: Fn(u32) -> bool> wide::Task for OffCentre<'_, F> {
     #[inline(always)]
     fn run<U: Unit>(self) {
-        let OffCentre { store, rests, waiting } = self;
+        let OffCentre { store, rows, rests, waiting } = self;
         let Layout { size, plane, .. } = store.layout;
-        for y in 0..size.height {
+        for y in rows {
             for x in (0..size.width).step_by(8) {
                 let first = store.layout.of_pixel(x as i32, y as i32);
                 let (mut known, mut central) = (M8::<U>::splat(0), M8::splat(0));

@@ -6,6 +6,7 @@
 //! land on pixel centres at the next refresh ([`aim`]).
 
 mod aim;
+mod covers;
 mod cracks;
 mod fill;
 mod gather;
@@ -13,6 +14,7 @@ mod holes;
 mod packed;
 mod relight;
 mod residual;
+mod rest;
 mod settle;
 mod stage;
 mod store;
@@ -39,6 +41,7 @@ pub struct Reproject {
     gather: gather::Gather,
     relight: relight::Relight,
     settled: settle::Settled,
+    covers: covers::Covers,
     /// The picture of the last refresh, and what is needed to find a surface in it.
     shown: Vec<[f32; 3]>,
     shown_at: Time,
@@ -67,6 +70,7 @@ impl Reproject {
             gather: gather::Gather::new(options.without != Some(ReprojectStage::Gather)),
             relight: Default::default(),
             settled: Default::default(),
+            covers: Default::default(),
             shown: Vec::new(),
             shown_at: Time::ZERO,
             display: Display::default(),
@@ -88,6 +92,7 @@ impl Reproject {
             self.refreshes = 0;
             self.shown.clear();
             self.settled.fit(size);
+            self.covers.fit(size);
             self.no_rates = None;
         }
     }
@@ -108,10 +113,12 @@ impl Reproject {
 
     /// Whoever is in a new sample's cell and moves will be somewhere else at the next refresh.
     fn make_room(&mut self, sample: &store::Sample) {
-        let is_moving = |&cell: &usize| !self.settled.rests(self.store.object[cell]);
-        let cell = self.store.layout.of_px(sample.px).filter(is_moving);
-        if let Some(cell) = cell.filter(|_| self.refreshes >= 2) {
-            self.warp.displace(&mut self.store, cell);
+        let Some(cell) = self.store.layout.of_px(sample.px) else { return };
+        if self.refreshes >= 2 {
+            self.covers.note(&self.store, cell, sample);
+            if !self.settled.rests(self.store.object[cell]) {
+                self.warp.displace(&mut self.store, cell);
+            }
         }
     }
 
@@ -206,15 +213,17 @@ impl Reproject {
             self.settled.hand_over(&mut self.store, refresh.display);
         }
         let at_rest = self.refreshes >= 2 && self.poses[0] == self.poses[1];
-        if at_rest && !self.warp.has_displaced() {
-            return;
+        if !at_rest || self.warp.has_displaced() {
+            // Of what was kept before the first refresh nobody knows yet where it is.
+            let (first, settled) = (self.refreshes < 2, &self.settled);
+            let rests = |object| object == store::SCREEN || !first && settled.rests(object);
+            self.warp.run(&mut self.store, &self.poses[0], rests);
+            if self.options.without != Some(ReprojectStage::Cracks) {
+                cracks::remove(&mut self.store, &mut self.covered);
+            }
         }
-        // Of what was kept before the first refresh nobody knows yet where it is.
-        let (first, settled) = (self.refreshes < 2, &self.settled);
-        let rests = |object| object == store::SCREEN || !first && settled.rests(object);
-        self.warp.run(&mut self.store, &self.poses[0], rests);
-        if self.options.without != Some(ReprojectStage::Cracks) {
-            cracks::remove(&mut self.store, &mut self.covered);
+        if self.options.without != Some(ReprojectStage::Covers) {
+            self.covers.run(&mut self.store);
         }
     }
 
@@ -246,7 +255,7 @@ impl Reproject {
         self.gather.run(store, now, threads, rates, contrast, &self.shown, picture);
         let recentres = self.options.without != Some(ReprojectStage::Recentre);
         if recentres && self.settled.any_rests() {
-            self.gather.find_off_centre(&self.store, |object| self.settled.rests(object));
+            self.gather.find_off_centre(&self.store, threads, |object| self.settled.rests(object));
         }
         if self.samples_wanted(refresh) > 0 {
             self.settled.show(&mut self.store, &self.relight, refresh, picture);

@@ -16,10 +16,10 @@
 
 use super::relight::Relight;
 use super::residual::squared;
-use super::store::{EMPTY, Layout, SCREEN, Store};
+use super::rest::{self, Rest};
+use super::store::{EMPTY, SCREEN, Store};
 use crate::tile::TileGrid;
-use crate::wide::{self, M8, Unit};
-use crate::{Display, Pose, Refinement, Refresh, Size, Surface};
+use crate::{Display, Pose, Refinement, Refresh, Size, Surface, bands, wide};
 
 /// Per pixel what its samples add up to; nothing where it is not at rest.
 #[derive(Default)]
@@ -36,6 +36,8 @@ pub(super) struct Settled {
     noise: Vec<f32>,
     /// Scratch memory: per first cell of a pixel 1 if something moves in it.
     moving: Vec<u8>,
+    /// Scratch memory, of each band of rows: cells that take over their pixel's mean, and which.
+    handed_back: Vec<Vec<(usize, [f32; 3])>>,
     /// Object numbers that have moved since the last refresh.
     moved: Vec<bool>,
     sky_moved: bool,
@@ -55,6 +57,28 @@ const NOISE_MEMORY: f32 = 1.0 / 64.0;
 const TILE: u32 = 8;
 /// A sample this many standard deviations off, squared, makes a pixel suspect.
 const SUSPECT: f32 = 9.0;
+
+/// What the samples of some pixels add up to, as in [`Settled`].
+pub(super) struct Means<'a> {
+    pub(super) count: &'a mut [u16],
+    pub(super) sum: &'a mut [[f32; 3]],
+    pub(super) spread: &'a mut [f32],
+    pub(super) encoded: &'a mut [[f32; 3]],
+}
+
+impl Means<'_> {
+    pub(super) fn begin(&mut self, pixel: usize, rgb: [f32; 3], display: &Display) {
+        self.count[pixel] = 1;
+        (self.sum[pixel], self.spread[pixel]) = (rgb, 0.0);
+        self.encoded[pixel] = display.encode(rgb);
+    }
+}
+
+/// Of samples that add up to `sum`.
+pub(super) fn mean(sum: [f32; 3], count: u16) -> [f32; 3] {
+    let per_count = 1.0 / f32::from(count);
+    sum.map(|c| c * per_count)
+}
 
 impl Settled {
     pub(super) fn fit(&mut self, size: Size) {
@@ -91,15 +115,13 @@ impl Settled {
     }
 
     fn begin(&mut self, pixel: usize, rgb: [f32; 3], display: &Display) {
-        self.count[pixel] = 1;
-        (self.sum[pixel], self.spread[pixel]) = (rgb, 0.0);
-        self.encoded[pixel] = display.encode(rgb);
+        let Settled { count, sum, spread, encoded, .. } = self;
+        Means { count, sum, spread, encoded }.begin(pixel, rgb, display);
     }
 
     /// Linear mean of the pixel's samples.
     fn mean(&self, pixel: usize) -> [f32; 3] {
-        let per_count = 1.0 / f32::from(self.count[pixel]);
-        self.sum[pixel].map(|c| c * per_count)
+        mean(self.sum[pixel], self.count[pixel])
     }
 
     /// Means for another display.
@@ -227,7 +249,29 @@ impl Settled {
             return self.count.fill(0);
         }
         self.find_moving(store);
-        wide::run(Show { settled: self, store, relight, refresh, picture });
+        let Size { width, height } = store.layout.size;
+        let rows = bands::rows(height, refresh.threads);
+        let band = (rows * width) as usize;
+        self.handed_back.resize_with(height.div_ceil(rows) as usize, Vec::new);
+        let chunks = self
+            .count
+            .chunks_mut(band)
+            .zip(self.sum.chunks_mut(band))
+            .zip(self.spread.chunks_mut(band))
+            .zip(self.encoded.chunks_mut(band))
+            .zip(picture.chunks_mut(band))
+            .zip(&mut self.handed_back);
+        let (shown, moving) = (&*store, &*self.moving);
+        let bands = chunks.enumerate().map(|(nth, chunks)| {
+            let (((((count, sum), spread), encoded), picture), handed_back) = chunks;
+            let means = Means { count, sum, spread, encoded };
+            let first = nth * band;
+            Rest { store: shown, relight, refresh, moving, first, means, picture, handed_back }
+        });
+        bands::run(refresh.threads, bands.collect(), wide::run);
+        for (cell, rgb) in self.handed_back.iter_mut().flat_map(|cells| cells.drain(..)) {
+            store.recolour(cell, rgb, refresh.display);
+        }
     }
 
     /// Marks the pixels of which a sample moves.
@@ -235,157 +279,14 @@ impl Settled {
         self.moving.clear();
         self.moving.resize(store.layout.plane, 0);
         if self.anything_moves() {
-            let moving = std::mem::take(&mut self.moving);
-            let mut marks = Marks { settled: self, store, moving };
-            wide::run(&mut marks);
-            self.moving = marks.moving;
+            let mut moving = std::mem::take(&mut self.moving);
+            rest::mark_moving(store, |object| !self.rests(object), &mut moving);
+            self.moving = moving;
         }
     }
 
     fn anything_moves(&self) -> bool {
         self.sky_moved || self.moved.contains(&true)
-    }
-}
-
-/// The pixels of which a sample moves, each at its first cell.
-struct Marks<'a> {
-    settled: &'a Settled,
-    store: &'a Store,
-    moving: Vec<u8>,
-}
-
-impl wide::Task for &mut Marks<'_> {
-    #[inline(always)]
-    fn run<U: Unit>(self) {
-        let (eights, _) = self.store.object.as_chunks::<8>();
-        for sub in eights.chunks_exact(self.store.layout.plane / 8) {
-            for (objects, marks) in sub.iter().zip(self.moving.as_chunks_mut::<8>().0) {
-                let first = objects[0];
-                if objects.iter().any(|&object| object != first) {
-                    for (mark, &object) in marks.iter_mut().zip(objects) {
-                        *mark |= u8::from(!self.settled.rests(object));
-                    }
-                } else if !self.settled.rests(first) {
-                    *marks = [1; 8];
-                }
-            }
-        }
-    }
-}
-
-/// Eight pixels at a time.
-struct Show<'a> {
-    settled: &'a mut Settled,
-    store: &'a mut Store,
-    relight: &'a Relight,
-    refresh: &'a Refresh<'a>,
-    picture: &'a mut [[f32; 3]],
-}
-
-impl wide::Task for Show<'_> {
-    #[inline(always)]
-    fn run<U: Unit>(mut self) {
-        let Size { width, height } = self.store.layout.size;
-        for y in 0..height {
-            for x in (0..width).step_by(8) {
-                self.eight::<U>(x, y, 8.min((width - x) as usize));
-            }
-        }
-    }
-}
-
-impl Show<'_> {
-    #[inline(always)]
-    fn eight<U: Unit>(&mut self, x: u32, y: u32, lanes: usize) {
-        let start = self.store.layout.size.index(x, y) as usize;
-        let all = (1 << lanes) - 1;
-        let rest = self.at_rest::<U>(x, y) & all;
-        let (some, many) = self.counted::<U>(start, lanes);
-        let mut begin = rest & !some;
-        if self.relight.has_changed_any() {
-            begin |= rest & some & self.relit(x, y, lanes);
-        }
-        each(begin, |lane| self.begin(x + lane as u32, y));
-        each(some & !rest, |lane| self.end(x + lane as u32, y));
-        let shown = many & rest & !begin;
-        if shown == all {
-            let means = &self.settled.encoded[start..start + lanes];
-            self.picture[start..start + lanes].copy_from_slice(means);
-        } else {
-            each(shown, |lane| self.picture[start + lane] = self.settled.encoded[start + lane]);
-        }
-    }
-
-    /// A bit for each of eight pixels: whether it has samples, and whether it has more than one.
-    #[inline(always)]
-    fn counted<U: Unit>(&self, start: usize, lanes: usize) -> (u32, u32) {
-        let mut counts = [0; 8];
-        for (count, &n) in counts.iter_mut().zip(&self.settled.count[start..start + lanes]) {
-            *count = u32::from(n);
-        }
-        let more_than = |n| M8::<U>::splat(n).less_than(M8::new(counts)).bits();
-        (more_than(0), more_than(1))
-    }
-
-    /// A bit for each of eight pixels: whether it has a sample at its centre, and nothing moves in it and the eight around it.
-    #[inline(always)]
-    fn at_rest<U: Unit>(&self, x: u32, y: u32) -> u32 {
-        let Layout { plane, stride, .. } = self.store.layout;
-        let first = self.store.layout.of_pixel(x as i32, y as i32);
-        let around = [first - stride, first, first + stride].map(|i| {
-            let eight = |i: usize| {
-                u64::from_le_bytes(self.settled.moving[i..i + 8].try_into().expect("eight"))
-            };
-            eight(i - 1) | eight(i) | eight(i + 1)
-        });
-        let moving = (around[0] | around[1] | around[2]).to_le_bytes();
-        let still =
-            moving.iter().enumerate().fold(0, |bits, (lane, &m)| bits | u32::from(m == 0) << lane);
-        if still == 0 {
-            return 0;
-        }
-        let subs = (0..self.store.layout.subs()).map(|sub| first + sub * plane);
-        let central = subs
-            .fold(M8::<U>::splat(0), |any, cell| any.either(self.store.are_central(cell, x, y)));
-        still & central.bits()
-    }
-
-    /// A bit for each of eight pixels: whether its sample at the centre has been shaded again.
-    #[inline(always)]
-    fn relit(&self, x: u32, y: u32, lanes: usize) -> u32 {
-        (0..lanes).fold(0, |bits, lane| {
-            let cell = self.store.central(x + lane as u32, y);
-            let relit = cell.is_some_and(|cell| self.relight.has_changed(self.store.object[cell]));
-            bits | u32::from(relit) << lane
-        })
-    }
-
-    fn begin(&mut self, x: u32, y: u32) {
-        if let Some(cell) = self.store.central(x, y) {
-            let pixel = self.store.layout.size.index(x, y) as usize;
-            let rgb = self.relight.linear(self.store, cell);
-            self.settled.begin(pixel, rgb, self.refresh.display);
-        }
-    }
-
-    fn end(&mut self, x: u32, y: u32) {
-        let pixel = self.store.layout.size.index(x, y) as usize;
-        if self.refresh.is_noisy
-            && self.settled.count[pixel] > 1
-            && let Some(cell) = self.store.central(x, y)
-        {
-            self.store.recolour(cell, self.settled.mean(pixel), self.refresh.display);
-        }
-        self.settled.count[pixel] = 0;
-    }
-}
-
-/// The bits that are set.
-#[inline(always)]
-fn each(mut bits: u32, mut act: impl FnMut(usize)) {
-    while bits != 0 {
-        act(bits.trailing_zeros() as usize);
-        bits &= bits - 1;
     }
 }
 

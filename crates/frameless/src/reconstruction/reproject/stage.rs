@@ -9,6 +9,8 @@ pub enum ReprojectStage {
     Range,
     /// Taking away what is seen through cracks between a nearer object's samples.
     Cracks,
+    /// Taking away what something nearer has come before.
+    Covers,
     /// Means: without, a pixel shows its own best sample as it is. Holes are filled as ever.
     Gather,
     /// Tracing pixels again that samples beside their centres show, once nothing moves.
@@ -17,10 +19,11 @@ pub enum ReprojectStage {
 
 impl ReprojectStage {
     /// All, in the order of the data.
-    pub const ALL: [ReprojectStage; 5] = [
+    pub const ALL: [ReprojectStage; 6] = [
         ReprojectStage::Aim,
         ReprojectStage::Range,
         ReprojectStage::Cracks,
+        ReprojectStage::Covers,
         ReprojectStage::Gather,
         ReprojectStage::Recentre,
     ];
@@ -31,6 +34,7 @@ impl ReprojectStage {
             ReprojectStage::Aim => "aim",
             ReprojectStage::Range => "range",
             ReprojectStage::Cracks => "cracks",
+            ReprojectStage::Covers => "covers",
             ReprojectStage::Gather => "gather",
             ReprojectStage::Recentre => "recentre",
         }

@@ -81,7 +81,8 @@ impl Tick {
         Time(((now.0 >> TICK_BITS) - ago) << TICK_BITS)
     }
 
-    fn is_later_than(self, other: Tick) -> bool {
+    #[inline(always)]
+    pub(super) fn is_later_than(self, other: Tick) -> bool {
         self.0.wrapping_sub(other.0) as i32 > 0
     }
 }

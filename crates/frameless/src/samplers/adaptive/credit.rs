@@ -4,6 +4,9 @@
 //! share of tile i of N = (1 − ε) m_i √v_i / Σ m√v + ε / N
 //! ```
 //!
+//! However much of a batch goes to refinement, the even part is a twentieth of what holes, fronts and late looks leave: no pixel is
+//! older than N pixels · 1.5 / (samples per second · 0.6 · 0.4 · 0.6 · 0.05), and that only while all three take all they may.
+//!
 //! The square root is the optimum for jump-like change: a pixel traced f times a second with an error that grows like v · age is
 //! off by v / 2f on average, and Σ v_i / f_i at given Σ f_i is least for f_i ∝ √v_i. m_i is how much the tile counts
 //! ([`weights`](super::weights)); the even part is not weighted.
@@ -69,30 +72,31 @@ impl Credit {
         self.shares.prefetch(tile);
     }
 
-    /// (a, b) of [`Shares::draw`] for a number of samples.
-    fn scale(&self, count: f32) -> (f32, f32) {
+    /// (a, b) of [`Shares::draw`] for a number of samples, of which `least_even` are spread evenly at the least.
+    fn scale(&self, count: f32, least_even: f32) -> (f32, f32) {
         let sums = self.shares.sums();
-        let evenly = if self.evenly || sums.weight <= 0.0 { 1.0 } else { EVENLY };
+        let is_even = self.evenly || sums.weight <= 0.0;
+        let evenly = if is_even { 1.0 } else { EVENLY.max(least_even / count).min(1.0) };
         let per_weight = f64::from((1.0 - evenly) * count) / sums.weight.max(f64::MIN_POSITIVE);
         (per_weight as f32, evenly * count / sums.even as f32)
     }
 
     /// The part of the samples that each tile gets, of those that holes and fronts leave.
     pub(crate) fn shares(&self) -> Vec<f32> {
-        let (a, b) = self.scale(1.0);
+        let (a, b) = self.scale(1.0, 0.0);
         self.shares.all(a, b)
     }
 
-    /// Gives out about `count` samples; exactly on average.
+    /// Gives out about `count` samples, exactly on average; `least_even` of them are spread evenly, if they are as many.
     pub(crate) fn draw(
         &mut self,
         now: Time,
         canvas: &Canvas,
         rates: &Rates,
-        count: f32,
+        [count, least_even]: [f32; 2],
         mut take: impl FnMut(u32),
     ) {
-        let (a, b) = self.scale(count);
+        let (a, b) = self.scale(count, least_even);
         self.tiles.clear();
         self.shares.draw(a, b, &mut self.tiles);
         // What is looked at lies all over the picture. In loops so short many places are fetched at once.

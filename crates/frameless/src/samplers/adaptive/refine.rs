@@ -23,7 +23,7 @@ use crate::tile::{TileGrid, TileRect};
 use crate::{Canvas, Refinement, Request, Rng, wide};
 
 /// ε: the least part of the samples that look for change, however still the picture is.
-const LEAST_TEMPORAL: f32 = 0.03;
+const LEAST_TEMPORAL: f32 = super::LEAST_EVEN;
 /// Variance of tiles of which nothing is known yet (Σ over the channels).
 const FIRST_VARIANCE: f32 = 1e-3;
 /// A tile's variance is the mean over its last samples: about so many.
