@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use frameless_session::{Drawn, Status};
 
-use crate::tiles::{self, Atlas, Published, SIDE, Seen};
+use crate::tiles::{self, Atlas, Published, SIDE, Seen, Times};
 use crate::wire::{Codec, StatusMessage, TilesHeader};
 
 /// Before anything has been encoded, in bytes per tile: lossy, exact.
@@ -13,7 +13,7 @@ const FIRST_GUESS: [f64; 2] = [130.0, 350.0];
 /// Of the newest message in what a tile is expected to take.
 const LEARNING_RATE: f64 = 0.2;
 /// While something moves, so much is refined per byte that is sent of what moves.
-const REFINE_SHARE: f64 = 0.25;
+const REFINE_SHARE: f64 = 0.15;
 /// The largest message in bytes while something moves: what moved most is on the page while the rest of the picture is still being
 /// encoded, and waits for no large refinement.
 const LARGEST_MOVING: usize = 16 << 10;
@@ -64,11 +64,12 @@ impl Outgoing {
 
     /// Chooses and encodes.
     pub(super) fn make(mut self, picture: Arc<Published>, room: &Room) -> Ready {
-        let now_ms = self.begun.elapsed().as_millis() as u32 + 1;
-        let bytes = if picture.calm { room.bytes } else { room.bytes.min(LARGEST_MOVING) };
+        let ms_at = |at: Instant| at.saturating_duration_since(self.begun).as_millis() as u32 + 1;
+        let times = Times { now_ms: ms_at(Instant::now()), calm_ms: ms_at(picture.calm_at) };
+        let bytes = if times.are_calm() { room.bytes } else { room.bytes.min(LARGEST_MOVING) };
         let tiles = self.cost.map(|cost| (bytes as f64 / cost) as usize);
         let refine = self.credit >= self.cost[1];
-        let chosen = self.seen.choose(&picture, now_ms, tiles, refine);
+        let chosen = self.seen.choose(&picture, times, tiles, refine);
         let wait = chosen.wait_ms.map(|ms| Duration::from_millis(ms.into()));
         if chosen.tiles.is_empty() {
             return self.nothing(picture, chosen.all_exact, wait);
@@ -82,7 +83,7 @@ impl Outgoing {
             return self.nothing(picture, false, wait);
         };
         self.learn(chosen.lossless, chosen.tiles.len(), payload.len(), room.window);
-        self.seen.sent(&picture, &chosen, now_ms);
+        self.seen.sent(&picture, &chosen, times.now_ms);
         let header = TilesHeader {
             codec,
             lossless: chosen.lossless,

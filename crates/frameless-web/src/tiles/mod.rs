@@ -14,7 +14,7 @@ pub(crate) use codec::encode;
 pub(crate) use flow::Flow;
 pub(crate) use grid::{Grid, SIDE};
 pub(crate) use publish::{Published, Publisher, Taken};
-pub(crate) use seen::Seen;
+pub(crate) use seen::{Seen, Times};
 
 #[cfg(test)]
 pub(crate) use publish::tests::{picture, published};

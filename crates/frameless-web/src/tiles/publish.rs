@@ -19,7 +19,7 @@ const SEEN: f64 = 1.0;
 /// What nobody sees is published this often.
 const UNSEEN_INTERVAL: Duration = Duration::from_millis(500);
 /// Without a change that is seen for so long the picture is calm.
-const CALM: Duration = Duration::from_millis(150);
+const CALM: Duration = Duration::from_millis(120);
 
 /// A picture with what is known of its tiles.
 pub(crate) struct Published {
@@ -35,8 +35,8 @@ pub(crate) struct Published {
     pub(crate) digests: Vec<u64>,
     /// Per tile: squared differences from one published picture to the next, summed over all since the generation began.
     pub(crate) change_sums: Vec<u64>,
-    /// Nothing that is seen has changed lately.
-    pub(crate) calm: bool,
+    /// From then on nothing that is seen has changed for a while, if no other picture is published.
+    pub(crate) calm_at: Instant,
     /// Pairs of client and its last input that the picture shows.
     pub(crate) inputs: Vec<(u32, u32)>,
     crc: OnceLock<u32>,
@@ -119,7 +119,7 @@ impl Publisher {
             (None, None) => 1,
         };
         let Some(last) = &self.last else {
-            let published = first(picture, generation, inputs);
+            let published = first(picture, generation, inputs, now);
             return self.publish(published, now);
         };
         let grid = last.grid();
@@ -150,7 +150,7 @@ impl Publisher {
             rgba: picture.rgba,
             digests,
             change_sums,
-            calm: self.quiet_for(now) >= CALM,
+            calm_at: self.seen_at + CALM,
             inputs,
             crc: OnceLock::new(),
         };
@@ -160,7 +160,7 @@ impl Publisher {
     fn publish(&mut self, mut published: Published, now: Instant) -> Taken {
         if self.last.is_none() {
             self.seen_at = now;
-            published.calm = false;
+            published.calm_at = now + CALM;
         }
         self.published_at = now;
         let published = Arc::new(published);
@@ -170,7 +170,7 @@ impl Publisher {
 }
 
 /// Of a generation.
-fn first(picture: Picture, generation: u32, inputs: Vec<(u32, u32)>) -> Published {
+fn first(picture: Picture, generation: u32, inputs: Vec<(u32, u32)>, now: Instant) -> Published {
     let grid = Grid::new(picture.size);
     Published {
         // Numbers need not be without gaps: a generation begins high above the last one's.
@@ -180,7 +180,7 @@ fn first(picture: Picture, generation: u32, inputs: Vec<(u32, u32)>) -> Publishe
         digests: (0..grid.len()).map(|tile| digest(&grid, tile, &picture.rgba)).collect(),
         change_sums: vec![0; grid.len()],
         rgba: picture.rgba,
-        calm: false,
+        calm_at: now,
         inputs,
         crc: OnceLock::new(),
     }
@@ -278,7 +278,7 @@ pub(crate) mod tests {
         let at = |ms| now + Duration::from_millis(ms);
         assert!(matches!(publisher.take(one_step(), Vec::new(), false, at(100)), Taken::Same(_)));
         let shown = published(publisher.take(other_step(), Vec::new(), false, at(510)));
-        assert!(shown.calm);
+        assert!(shown.calm_at <= at(510));
     }
 
     #[test]
@@ -302,7 +302,7 @@ pub(crate) mod tests {
         let mut publisher = Publisher::new(now);
         published(publisher.take(grey(10), Vec::new(), false, now));
         // One step in each channel: 3 ≥ SEEN.
-        assert!(!published(publisher.take(grey(11), Vec::new(), false, now)).calm);
+        assert!(!published(publisher.take(grey(11), Vec::new(), false, now)).calm_at <= now);
     }
 
     #[test]

@@ -43,6 +43,21 @@ struct Tile {
     exactly: u8,
 }
 
+/// In milliseconds of a clock of the caller's that begins above 0.
+#[derive(Clone, Copy)]
+pub(crate) struct Times {
+    pub(crate) now_ms: u32,
+    /// Of [`Published::calm_at`].
+    pub(crate) calm_ms: u32,
+}
+
+impl Times {
+    /// Nothing that is seen has changed lately.
+    pub(crate) fn are_calm(self) -> bool {
+        self.now_ms >= self.calm_ms
+    }
+}
+
 /// What is to be sent.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Chosen {
@@ -74,14 +89,13 @@ impl Seen {
         self.tiles.capacity() * size_of::<Tile>()
     }
 
-    /// Picks what to send of the picture: visible changes, or else (or with `refine`) what is ripe for refinement. `now_ms` is a
-    /// clock of the caller's that begins above 0.
+    /// Picks what to send of the picture: visible changes, or else (or with `refine`) what is ripe for refinement.
     ///
     /// At most `lossy` tiles of the one or `exact` of the other kind.
     pub(crate) fn choose(
         &mut self,
         picture: &Published,
-        now_ms: u32,
+        times: Times,
         [lossy, exact]: [usize; 2],
         refine: bool,
     ) -> Chosen {
@@ -94,7 +108,7 @@ impl Seen {
         let mut resting: Vec<u16> = Vec::new();
         let mut chosen = Chosen { all_exact: true, ..Chosen::default() };
         for (index, tile) in self.tiles.iter_mut().enumerate() {
-            let need = tile.need(picture, &grid, index, now_ms);
+            let need = tile.need(picture, &grid, index, times);
             chosen.all_exact &= matches!(need, Need::Nothing);
             match need {
                 Need::Nothing => {}
@@ -139,7 +153,8 @@ impl Seen {
 }
 
 impl Tile {
-    fn need(&mut self, picture: &Published, grid: &Grid, index: usize, now_ms: u32) -> Need {
+    fn need(&mut self, picture: &Published, grid: &Grid, index: usize, times: Times) -> Need {
+        let Times { now_ms, calm_ms } = times;
         let digest = picture.digests[index];
         if self.latest != digest as u32 {
             (self.latest, self.stirred_ms) = (digest as u32, now_ms);
@@ -168,10 +183,8 @@ impl Tile {
             0 => self.stirred_ms.max(self.sent_ms) + QUIET_MS,
             _ => self.stirred_ms + UNSEEN_MS[0],
         };
-        let at_ms = match picture.calm {
-            true => self.sent_ms + QUIET_MS,
-            false => quiet_ms.min(self.sent_ms + unseen_ms),
-        };
+        let while_calm_ms = calm_ms.max(self.sent_ms + QUIET_MS);
+        let at_ms = while_calm_ms.min(quiet_ms).min(self.sent_ms + unseen_ms);
         Need::Exact { in_ms: at_ms.saturating_sub(now_ms) }
     }
 }
@@ -222,9 +235,14 @@ mod tests {
         }
     }
 
+    /// While the picture moves.
+    fn at(now_ms: u32) -> Times {
+        Times { now_ms, calm_ms: u32::MAX }
+    }
+
     /// Chooses, and sends what was chosen.
     fn send(seen: &mut Seen, shown: &Published, now_ms: u32, most: [usize; 2]) -> Chosen {
-        let chosen = seen.choose(shown, now_ms, most, false);
+        let chosen = seen.choose(shown, at(now_ms), most, false);
         seen.sent(shown, &chosen, now_ms);
         chosen
     }
@@ -239,7 +257,7 @@ mod tests {
         assert_eq!((early.tiles, early.wait_ms), (vec![], Some(1 + QUIET_MS - 50)));
         let exact = send(&mut seen, &shown, 1 + QUIET_MS, PLENTY);
         assert_eq!((exact.tiles, exact.lossless, exact.all_exact), (vec![0, 1, 2, 3], true, false));
-        let done = seen.choose(&shown, 1000, PLENTY, true);
+        let done = seen.choose(&shown, at(1000), PLENTY, true);
         assert_eq!(done, Chosen { all_exact: true, ..Chosen::default() });
     }
 
@@ -289,13 +307,27 @@ mod tests {
     }
 
     #[test]
+    fn what_nobody_sees_is_sent_as_soon_as_nothing_moves() {
+        let mut scene = Scene::new();
+        let mut seen = exact_everywhere(&mut scene);
+        scene.rgba[5][0] ^= 1;
+        let shown = scene.show();
+        let moving = seen.choose(&shown, at(1000), PLENTY, false);
+        assert!(moving.tiles.is_empty() && moving.wait_ms > Some(QUIET_MS), "{moving:?}");
+        let calm = seen.choose(&shown, Times { now_ms: 1000, calm_ms: 900 }, PLENTY, false);
+        assert_eq!((calm.tiles, calm.lossless), (vec![0], true));
+        let soon = seen.choose(&shown, Times { now_ms: 1000, calm_ms: 1050 }, PLENTY, false);
+        assert_eq!(soon.wait_ms, Some(50));
+    }
+
+    #[test]
     fn another_generation_begins_anew() {
         let mut scene = Scene::new();
         let mut seen = exact_everywhere(&mut scene);
         let smaller = Size::new(SIDE + 1, 3);
         let rgba = vec![[1, 2, 3, 255]; smaller.pixels()];
         let taken = scene.publisher.take(picture(smaller, rgba), Vec::new(), false, scene.now);
-        let chosen = seen.choose(&published(taken), 1000, PLENTY, false);
+        let chosen = seen.choose(&published(taken), at(1000), PLENTY, false);
         assert_eq!(chosen.tiles, [0, 1]);
     }
 
@@ -306,7 +338,7 @@ mod tests {
         let black = picture(size, vec![[0, 0, 0, 255]; size.pixels()]);
         let shown = published(Publisher::new(now).take(black, Vec::new(), false, now));
         let mut seen = Seen::nothing();
-        assert_eq!(seen.choose(&shown, 1, [usize::MAX; 2], true).tiles.len(), MOST_TILES);
+        assert_eq!(seen.choose(&shown, at(1), [usize::MAX; 2], true).tiles.len(), MOST_TILES);
         assert_eq!(size_of::<Tile>(), 40);
         assert!(seen.bytes() < 1_500_000, "{} bytes for the largest picture", seen.bytes());
     }

@@ -235,7 +235,7 @@ def samples_lost(bench: Bench) -> dict:
     with bench.server() as server:
         _light(server.url, 2)  # before the first picture there is nothing to count from
         time.sleep(3)
-        for _ in range(max(2, int(bench.secs(8)))):
+        for _ in range(max(4, int(bench.secs(8)))):
             result = _light(server.url, 4)
             alone.extend(filter(None, [result["samples_per_sec_before"]]))
             light.append(result["samples_per_sec"])

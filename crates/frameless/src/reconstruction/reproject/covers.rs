@@ -113,7 +113,8 @@ impl Covers {
         self.suspect.clear();
         let (columns, rows) = (self.columns, self.tiles.len() as u32 / self.columns);
         let beside = |at: u32, end: u32| at.saturating_sub(1)..(at + 2).min(end);
-        for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+        for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)))
+        {
             let near = beside(row, rows)
                 .flat_map(|row| beside(column, columns).map(move |column| row * columns + column))
                 .map(|tile| &self.tiles[tile as usize])
@@ -226,7 +227,8 @@ fn around(level: &[[f32; AROUND]; AROUND], [bx, by]: [usize; 2], scale: usize) -
     for [[left, right], [top, bottom]] in VANES {
         let mut in_vane = NOTHING;
         for (dy, dx) in (top..=bottom).flat_map(|dy| (left..=right).map(move |dx| (dy, dx))) {
-            let [x, y] = [(bx, dx), (by, dy)].map(|(b, d)| b.wrapping_add_signed(d * scale as isize));
+            let [x, y] =
+                [(bx, dx), (by, dy)].map(|(b, d)| b.wrapping_add_signed(d * scale as isize));
             in_vane = in_vane.max(level[y][x]);
         }
         if in_vane == NOTHING {

@@ -125,10 +125,12 @@ impl Gather {
         }
     }
 
-    /// After a picture: samples beside their pixel's centre are to be traced again, where their object `rests`.
+    /// After a picture: samples beside their pixel's centre are to be traced again, where their object `rests`; so are those at the centre
+    /// that have been carried there, since the camera came to rest only after `carried`.
     pub(super) fn find_off_centre(
         &mut self,
         store: &Store,
+        carried: Tick,
         threads: usize,
         rests: impl Fn(u32) -> bool + Sync,
     ) {
@@ -137,7 +139,7 @@ impl Gather {
         let firsts = (0..height).step_by(band as usize);
         let bands = self.found.iter_mut().zip(firsts).map(|(found, first)| {
             let rows = first..(first + band).min(height);
-            OffCentre { store, rows, rests: &rests, waiting: &mut found.waiting }
+            OffCentre { store, rows, carried, rests: &rests, waiting: &mut found.waiting }
         });
         bands::run(threads, bands.collect(), wide::run);
         self.found.iter_mut().for_each(|found| self.waiting.append(&mut found.waiting));
@@ -147,6 +149,7 @@ impl Gather {
 struct OffCentre<'a, F> {
     store: &'a Store,
     rows: Range<u32>,
+    carried: Tick,
     rests: &'a F,
     waiting: &'a mut Waiting,
 }
@@ -154,7 +157,7 @@ struct OffCentre<'a, F> {
 impl<F: Fn(u32) -> bool> wide::Task for OffCentre<'_, F> {
     #[inline(always)]
     fn run<U: Unit>(self) {
-        let OffCentre { store, rows, rests, waiting } = self;
+        let OffCentre { store, rows, carried, rests, waiting } = self;
         let Layout { size, plane, .. } = store.layout;
         for y in rows {
             for x in (0..size.width).step_by(8) {
@@ -164,7 +167,9 @@ impl<F: Fn(u32) -> bool> wide::Task for OffCentre<'_, F> {
                     let i = first + sub * plane;
                     let is_sample = M8::load(&store.object, i).equals(M8::splat(EMPTY)).not();
                     known = known.either(is_sample);
-                    central = central.either(store.are_central(i, x, y));
+                    let since = M8::load(&store.tick, i).minus(M8::splat(carried.0));
+                    let is_traced = M8::splat(0).less_than(since);
+                    central = central.either(store.are_central(i, x, y).and(is_traced));
                 }
                 // Cells beyond the border are empty.
                 known.and(central.not()).for_each(|lane| {

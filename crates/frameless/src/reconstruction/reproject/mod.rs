@@ -50,6 +50,8 @@ pub struct Reproject {
     poses: [Pose; 2],
     /// Seconds between these two.
     interval_secs: f32,
+    /// When everything was carried somewhere else last, since the camera moved.
+    carried: Tick,
     refreshes: u64,
     contrast: Vec<f32>,
     holes: Vec<u32>,
@@ -76,6 +78,7 @@ impl Reproject {
             display: Display::default(),
             poses: Default::default(),
             interval_secs: 0.0,
+            carried: Tick::default(),
             refreshes: 0,
             contrast: Vec::new(),
             holes: Vec::new(),
@@ -90,6 +93,7 @@ impl Reproject {
             self.store = Store::new(size, self.cells);
             self.warp = Default::default();
             self.refreshes = 0;
+            self.carried = Tick::default();
             self.shown.clear();
             self.settled.fit(size);
             self.covers.fit(size);
@@ -212,6 +216,9 @@ impl Reproject {
         if refresh.is_noisy {
             self.settled.hand_over(&mut self.store, refresh.display);
         }
+        if self.refreshes >= 2 && !self.settled.any_rests() {
+            self.carried = Tick::of(refresh.now);
+        }
         let at_rest = self.refreshes >= 2 && self.poses[0] == self.poses[1];
         if !at_rest || self.warp.has_displaced() {
             // Of what was kept before the first refresh nobody knows yet where it is.
@@ -255,7 +262,8 @@ impl Reproject {
         self.gather.run(store, now, threads, rates, contrast, &self.shown, picture);
         let recentres = self.options.without != Some(ReprojectStage::Recentre);
         if recentres && self.settled.any_rests() {
-            self.gather.find_off_centre(&self.store, threads, |object| self.settled.rests(object));
+            let rests = |object| self.settled.rests(object);
+            self.gather.find_off_centre(&self.store, self.carried, threads, rests);
         }
         if self.samples_wanted(refresh) > 0 {
             self.settled.show(&mut self.store, &self.relight, refresh, picture);
