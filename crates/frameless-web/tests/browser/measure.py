@@ -11,6 +11,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -254,12 +255,20 @@ def samples_lost(bench: Bench) -> dict:
 
 
 def _light(url: str, secs: float) -> dict:
-    return json.loads(_light_process(url, secs).communicate()[0])
+    return LightProcess(url, secs).result()
 
 
-def _light_process(url: str, secs: float, *args: str) -> subprocess.Popen:
-    command = [sys.executable, str(HERE / "light_client.py"), url, str(secs), *args]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+class LightProcess(subprocess.Popen):
+    """light_client.py. What it prints goes to a file: it is more than a pipe holds that nobody reads meanwhile."""
+
+    def __init__(self, url: str, secs: float, *args: str):
+        self.printed = tempfile.TemporaryFile("w+")
+        super().__init__([sys.executable, str(HERE / "light_client.py"), url, str(secs), *args], stdout=self.printed)
+
+    def result(self) -> dict:
+        self.wait()
+        self.printed.seek(0)
+        return json.load(self.printed)
 
 
 def stopped_client(bench: Bench) -> dict:
@@ -267,9 +276,9 @@ def stopped_client(bench: Bench) -> dict:
     secs = bench.secs(120)
     with bench.server() as server:
         def others_wait(stop_one: bool) -> tuple[list, list, int]:
-            driver = _light_process(server.url, secs, "--drive")
-            watching = [_light_process(server.url, secs) for _ in range(6)]
-            last = _light_process(server.url, secs + 600 if stop_one else secs)
+            driver = LightProcess(server.url, secs, "--drive")
+            watching = [LightProcess(server.url, secs) for _ in range(6)]
+            last = LightProcess(server.url, secs + 600 if stop_one else secs)
             time.sleep(4)
             memory = [_resident_kib(server.process.pid)]
             if stop_one:
@@ -277,7 +286,7 @@ def stopped_client(bench: Bench) -> dict:
             while driver.poll() is None:
                 time.sleep(min(1, secs / 10))
                 memory.append(_resident_kib(server.process.pid))
-            results = [json.loads(process.communicate()[0]) for process in [driver, *watching]]
+            results = [process.result() for process in [driver, *watching]]
             last.kill()
             last.wait()
             gaps = [gap for result in results for gap in result["gaps_secs"]]
