@@ -86,7 +86,7 @@ def main() -> None:
         row(f"{name}, the same in Rust, ns/sample", rounds, lambda: next(rust))
         added = iter([in_python - in_rust for in_python, in_rust in both])
         row(f"{name}, what Python adds, ns/sample", rounds, lambda: next(added))
-    for sampler, reconstruction in (("permutation", "hold"), ("adaptive", "reproject+antialias")):
+    for sampler, reconstruction in (("permutation", "hold"), ("adaptive", "hold"), ("adaptive", "reproject+antialias")):
         row(
             f"trivial numpy renderer, `{sampler}+{reconstruction}`, M samples/s",
             rounds,

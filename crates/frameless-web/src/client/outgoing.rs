@@ -13,10 +13,12 @@ const FIRST_GUESS: [f64; 2] = [130.0, 350.0];
 /// Of the newest message in what a tile is expected to take.
 const LEARNING_RATE: f64 = 0.2;
 /// While something moves, so much is refined per byte that is sent of what moves.
-const REFINE_SHARE: f64 = 0.15;
+const REFINE_SHARE: f64 = 0.06;
 /// The largest message in bytes while something moves: what moved most is on the page while the rest of the picture is still being
 /// encoded, and waits for no large refinement.
 const LARGEST_MOVING: usize = 16 << 10;
+/// The same while nothing does: an atlas, what it is encoded to and the message are in memory at once.
+const LARGEST_CALM: usize = 1 << 20;
 
 /// What a client has been sent, and what that took. Passed to a thread and back for every message.
 pub(super) struct Outgoing {
@@ -66,7 +68,8 @@ impl Outgoing {
     pub(super) fn make(mut self, picture: Arc<Published>, room: &Room) -> Ready {
         let ms_at = |at: Instant| at.saturating_duration_since(self.begun).as_millis() as u32 + 1;
         let times = Times { now_ms: ms_at(Instant::now()), calm_ms: ms_at(picture.calm_at) };
-        let bytes = if times.are_calm() { room.bytes } else { room.bytes.min(LARGEST_MOVING) };
+        let largest = if times.are_calm() { LARGEST_CALM } else { LARGEST_MOVING };
+        let bytes = room.bytes.min(largest);
         let tiles = self.cost.map(|cost| (bytes as f64 / cost) as usize);
         let refine = self.credit >= self.cost[1];
         let chosen = self.seen.choose(&picture, times, tiles, refine);

@@ -5,8 +5,8 @@ use jpeg_encoder::{ColorType, QuantizationTableType, SamplingFactor};
 use super::Atlas;
 use crate::wire::Codec;
 
-/// Of JPEG with a flat table, 1 to 100: all frequencies of all channels are rounded to about 14 steps. Higher brings more bytes than it takes from the error.
-const QUALITY: u8 = 56;
+/// Of JPEG with a flat table, 1 to 100: all frequencies of all channels are rounded to about 13 steps. Higher brings more bytes than it takes from the error.
+const QUALITY: u8 = 58;
 
 /// The payload of a message. JPEG is for what moves, PNG is exact.
 pub(crate) fn encode(codec: Codec, atlas: &Atlas) -> Result<Vec<u8>, EncodeError> {

@@ -16,8 +16,8 @@ const QUIET_MS: u32 = 120;
 const UNSEEN_MS: [u32; 3] = [1000, 4000, 8000];
 /// A tile that was never sent comes before any change: the largest possible change of a tile.
 const NEVER: f64 = 3.0 * 255.0 * 255.0;
-/// In one message. 2048 · 16 · 16 pixels are 1.5 MB of RGB, which each client may hold while it is encoded.
-const MOST_TILES: usize = 2048;
+/// In one message. 1536 · 16 · 16 pixels are 1.2 MB of RGB, which each client may hold while it is encoded.
+const MOST_TILES: usize = 1536;
 
 /// Of one client. 40 bytes per tile.
 pub(crate) struct Seen {
