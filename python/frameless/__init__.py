@@ -28,7 +28,7 @@ from ._frameless import (
     Session,
     __version__,
 )
-from . import metrics, testing
+from . import metrics, plot, testing
 from .experiment import compare, compare_file
 from .png import save_png
 from .samples import Samples
@@ -53,6 +53,7 @@ __all__ = [
     "compare",
     "compare_file",
     "metrics",
+    "plot",
     "save_png",
     "serve",
     "testing",

@@ -1,7 +1,6 @@
 """A function in Python, looked at: in the browser, or inline in a notebook."""
 
 import atexit
-import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -14,7 +13,8 @@ Render = Callable[..., Any]
 seconds; ``camera.rays(x, y)`` are the rays through them. Returns linear RGB of shape (n, 3), or Samples. With ``noisy`` it is called
 with ``seed``, too: uint32 of shape (n,)."""
 
-_served: "weakref.WeakSet[Served]" = weakref.WeakSet()
+_served: list[Served] = []
+"""All that have been started. Kept, so that who forgets a page can still be stopped at exit: its thread calls into the interpreter."""
 
 
 def serve(
@@ -49,6 +49,7 @@ def serve(
 
     Raises OSError if the port is taken, ValueError for values that make no sense.
     """
+    _served[:] = [page for page in _served if page.running]
     served = start_serving(
         render,
         size,
@@ -62,7 +63,7 @@ def serve(
         port,
         allow_frame,
     )
-    _served.add(served)
+    _served.append(served)
     return served
 
 

@@ -141,3 +141,32 @@ if importlib.util.find_spec("torch") is not None:
         import torch  # type: ignore[import-not-found]
 
         assert batch().submit(torch.tensor(RGB)) == N
+
+
+def test_fields_of_packed_structured_arrays_are_read_as_they_are() -> None:
+    n = 100
+    packed = np.zeros(n, [("flag", "u1"), ("rgb", "f4", 3), ("x", "f4")])
+    packed["rgb"], packed["x"] = 0.25, np.arange(n)
+    with frameless.Session((10, 10), batch=n, sampler="permutation", reconstruction="hold") as session:
+        for batch in session:
+            assert batch.submit(packed["rgb"][: len(batch)]) == len(batch)
+            break
+        assert np.ptp(session.image()[session.known()]) == 0
+    picture = np.zeros((4, 5), [("rgb", "f4", 3), ("flag", "u1")])
+    assert frameless.metrics.rmse(picture["rgb"], picture["rgb"].copy()) == 0
+
+
+def test_a_field_of_a_packed_structured_array_takes_no_picture() -> None:
+    packed = np.zeros((6, 8), [("rgb", "f4", 3), ("flag", "u1")])
+    with frameless.Session((8, 6)) as session, pytest.raises(ValueError, match="packed"):
+        session.image(out=packed["rgb"])
+    assert not packed["flag"].any()
+
+
+def test_a_picture_of_one_pixel() -> None:
+    with frameless.Session((1, 1)) as session:
+        for count, batch in enumerate(session):
+            batch.submit(np.full((len(batch), 3), 0.5, np.float32))
+            if count == 5:
+                break
+        assert session.image().shape == (1, 1, 3)

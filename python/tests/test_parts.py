@@ -126,6 +126,13 @@ def test_compare_returns_rows_that_repeat() -> None:
     assert [row["rmse"] for row in again] == [row["rmse"] for row in rows]
 
 
+def test_compare_takes_built_in_samplers_made_from_a_seed() -> None:
+    made: Any = [("mine", lambda seed: BuiltinSampler("random", seed)), "random"]
+    rows = compare("sphere", made, size=(32, 24), samples_per_sec=20_000, seconds=1.0)
+    assert {row["algorithm"] for row in rows} == {"mine", "random"}
+    assert rows[0]["rmse"] == rows[1]["rmse"]
+
+
 def test_compare_measures_what_is_asked_for() -> None:
     (row,) = compare(
         "shadow", ["adaptive+reproject"], size=(48, 36), samples_per_sec=20_000, seconds=0.6, ssim_every=6, flip_every=12

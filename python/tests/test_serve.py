@@ -1,5 +1,7 @@
 """A renderer on a page: it answers, it stops, and what the renderer raises is not lost."""
 
+import subprocess
+import sys
 import time
 import urllib.error
 import urllib.request
@@ -167,3 +169,26 @@ def test_a_port_that_is_taken_is_said() -> None:
     with pytest.raises(OSError, match=f"port {port} is taken"):
         serve(pattern, (32, 24), port=port)
     served.stop()
+
+
+def test_a_page_that_is_forgotten_ends_with_the_interpreter() -> None:
+    code = (
+        "import numpy as np, frameless, time\n"
+        "render = lambda x, y, t, camera: np.zeros((len(x), 3), np.float32)\n"
+        "page = frameless.serve(render, (64, 48)); page = frameless.serve(render, (64, 48))\n"
+        "frameless.serve(render, (64, 48)); time.sleep(0.3)\n"
+    )
+    assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
+
+
+def test_a_renderer_may_stop_its_own_page() -> None:
+    pages: list[frameless.Served] = []
+
+    def render(x: Any, y: Any, t: float, camera: frameless.Camera) -> Any:
+        if pages:
+            pages[0].stop()
+        return np.zeros((len(x), 3), np.float32)
+
+    pages.append(serve(render, (64, 48)))
+    wait_for(lambda: not pages[0].running)
+    pages[0].stop()

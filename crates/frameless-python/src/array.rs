@@ -15,7 +15,7 @@ pub(crate) type Where<'a> = &'a dyn Fn(usize) -> String;
 /// Anything that is an array: numpy's, or one that speaks DLPack (torch, jax, …) and lies in the machine's own memory.
 fn array<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
     if let Ok(array) = value.cast::<PyUntypedArray>() {
-        return Ok(array.clone());
+        return if is_regular(array)? { Ok(array.clone()) } else { contiguous(array) };
     }
     let kind = value.get_type().name()?;
     if !value.hasattr("__dlpack__")? {
@@ -33,6 +33,20 @@ fn array<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUn
         error
     })?;
     Ok(array.cast_into::<PyUntypedArray>()?)
+}
+
+/// Whether elements lie at multiples of their size from each other, and where the processor wants them. The field of a packed
+/// structured array may not, and is then no array to Rust.
+pub(crate) fn is_regular(array: &Bound<'_, PyUntypedArray>) -> PyResult<bool> {
+    let bytes = array.dtype().itemsize().max(1) as isize;
+    let is_aligned: bool = array.getattr("flags")?.getattr("aligned")?.extract()?;
+    Ok(is_aligned && array.strides().iter().all(|stride| stride % bytes == 0))
+}
+
+/// The same numbers in memory of their own.
+fn contiguous<'py>(array: &Bound<'py, PyUntypedArray>) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let numpy = array.py().import("numpy")?;
+    Ok(numpy.call_method1("array", (array, array.dtype(), true, "C"))?.cast_into()?)
 }
 
 fn wrong_shape(name: &str, wanted: &[usize], array: &Bound<'_, PyUntypedArray>) -> PyErr {

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::array;
 use crate::interrupt::{Stop, interruptible};
-use crate::sampler::PythonSampler;
+use crate::sampler::from_python;
 use crate::shared::Raised;
 
 /// A sampler from Python among the algorithms: its name, how its samples are shown, and what makes one of a seed.
@@ -117,9 +117,9 @@ fn customs(
         PyValueError::new_err(format!("algorithm {name:?}: there is no reconstruction {shown:?}"))
     })?;
     let plan = |&seed: &u64| {
-        let sampler = PythonSampler::new(&factory.call1((seed,))?, raised.clone())?;
+        let sampler = from_python(&factory.call1((seed,))?, seed, raised)?;
         let cell = cell(scene, algorithm.clone(), rate, seed);
-        Ok(Planned { name: name.to_owned(), cell, sampler: Some(Box::new(sampler)) })
+        Ok(Planned { name: name.to_owned(), cell, sampler: Some(sampler) })
     };
     experiment.seeds.iter().map(plan).collect()
 }

@@ -26,6 +26,10 @@ pub(crate) fn image<'py>(
         let message = format!("out: wanted shape {wanted:?}, got {:?}", out.shape());
         return Err(PyValueError::new_err(message));
     }
+    if !array::is_regular(out.as_untyped())? {
+        let message = "out: wanted an array whose elements lie at multiples of their size, got a field of a packed structured one";
+        return Err(PyValueError::new_err(message));
+    }
     let mut target = out.try_readwrite()?;
     let flat = picture.into_flattened();
     let in_order = target.is_c_contiguous();

@@ -86,8 +86,16 @@ impl Served {
         self.thread().as_ref().is_some_and(|thread| !thread.is_finished())
     }
 
-    /// Waits for the server's end, without the interpreter.
+    /// Waits for the server's end, without the interpreter. Ctrl-C ends the waiting. In the thread that calls the renderer, and so has to end first,
+    /// there is nothing to wait for.
     fn join(&self, py: Python<'_>) -> PyResult<()> {
+        if std::thread::current().name() == Some(frameless_session::LOOP_THREAD) {
+            return Ok(());
+        }
+        while self.is_running() {
+            py.detach(|| std::thread::sleep(LOOK_EVERY));
+            py.check_signals()?;
+        }
         let Some(thread) = self.thread().take() else { return Ok(()) };
         match py.detach(|| thread.join()) {
             Ok(Ok(())) => Ok(()),

@@ -29,7 +29,7 @@ pub use helm::{Helm, Looking};
 pub use load::{Loading, Outcome, open};
 pub use overlay::{Colours, Drawn, Legend};
 pub use pace::Pace;
-pub use render_thread::{Ended, RenderThread};
+pub use render_thread::{Ended, LOOP_THREAD, RenderThread};
 pub use session::{Session, Stage};
 pub use settings::{Overlay, PictureSize, Settings};
 pub use shown::Ages;

@@ -10,6 +10,9 @@ use crate::command::{Command, Report};
 use crate::pace::Pace;
 use crate::session::{Session, Stage};
 
+/// The name of the thread that renderers are called in.
+pub const LOOP_THREAD: &str = "render loop";
+
 /// A running loop. Ends when dropped.
 pub struct RenderThread<W> {
     // Taken on drop: that the channel is closed is the sign to end.
@@ -34,7 +37,7 @@ impl<W: Send + 'static> RenderThread<W> {
         let (to_loop, commands) = channel();
         let (to_window, reports) = channel();
         let thread = Builder::new()
-            .name("render loop".to_owned())
+            .name(LOOP_THREAD.to_owned())
             .spawn(move || run(session, &commands, &to_window, wake))?;
         Ok(RenderThread { commands: Some(to_loop), reports, thread: Some(thread) })
     }
@@ -87,11 +90,13 @@ fn run<S: Stage>(
         wake();
     };
     loop {
-        // Of the sizes that a window takes on while its border is dragged only the last matters, and each would cost a refresh.
-        let mut size = None;
+        // Of the sizes that a window takes on while its border is dragged only the last matters, and each would cost a refresh; of
+        // settings, too, and each may cost a sampler.
+        let (mut size, mut settings) = (None, None);
         loop {
             match commands.try_recv() {
                 Ok(Command::Size(wanted)) => size = Some(wanted),
+                Ok(Command::Settings(wanted)) => settings = Some(wanted),
                 Ok(Command::WantPicture { memory, paint_secs }) => {
                     pace.painted(paint_secs);
                     wanted = Some(memory);
@@ -106,8 +111,8 @@ fn run<S: Stage>(
                 Err(TryRecvError::Disconnected) => return,
             }
         }
-        if let Some(size) = size {
-            session.apply(Command::Size(size));
+        for command in size.map(Command::Size).into_iter().chain(settings.map(Command::Settings)) {
+            session.apply(command);
         }
         if let Err(error) = session.step()
             && session.now() >= next_error

@@ -43,6 +43,18 @@ const LONGEST_UNHURRIED: Duration = Duration::from_millis(50);
 /// A client that is told why it may not act is not told again for so long.
 const BETWEEN_REFUSALS: Duration = Duration::from_secs(2);
 
+/// Of a scene's cameras, notes and warnings clients are told so many; what waits for a client is bounded.
+const MOST_TEXTS: usize = 256;
+const LONGEST_TEXT: usize = 300;
+
+/// The beginning of what a file says.
+fn shortened(text: &str) -> String {
+    match text.char_indices().nth(LONGEST_TEXT) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
 /// The thread's state.
 pub(crate) struct Hub<W: Send + 'static> {
     render: RenderThread<W>,
@@ -59,6 +71,7 @@ pub(crate) struct Hub<W: Send + 'static> {
     refused: BTreeMap<u32, Instant>,
     inputs: Inputs,
     view_changed: bool,
+    settings_changed: bool,
     publisher: Publisher,
     overlay: Option<Drawn>,
     // Memory for the next picture; none while one is being made.
@@ -108,6 +121,7 @@ where
         refused: BTreeMap::new(),
         inputs: Inputs::default(),
         view_changed: true,
+        settings_changed: false,
         publisher: Publisher::new(Instant::now()),
         overlay: None,
         memory: Some(Vec::new()),
@@ -256,7 +270,7 @@ impl<W: Send + 'static> Hub<W> {
             Said::Settings(change) => match settings::changed(&self.settings, &change) {
                 Ok(settings) => {
                     self.settings = settings;
-                    self.render.send(Command::Settings(settings));
+                    self.settings_changed = true;
                     self.follow_place();
                 }
                 Err(text) => self.roster.notice_to(client, Level::Error, text),
@@ -294,6 +308,9 @@ impl<W: Send + 'static> Hub<W> {
 
     /// What the clients' inputs come to, and a wish for a picture.
     fn tell_loop(&mut self) {
+        if std::mem::take(&mut self.settings_changed) {
+            self.render.send(Command::Settings(self.settings));
+        }
         if std::mem::take(&mut self.view_changed) {
             self.render.send(Command::View(self.helm.view()));
         }
@@ -380,14 +397,15 @@ impl<W: Send + 'static> Hub<W> {
         let scene = self.helm.scene();
         let name = |(index, camera): (usize, &frameless_scene::Camera)| match &*camera.name {
             "" => format!("camera {index}"),
-            name => format!("camera {index}: {name}"),
+            name => shortened(&format!("camera {index}: {name}")),
         };
+        let some = |texts: &[String]| texts.iter().take(MOST_TEXTS).map(|t| shortened(t)).collect();
         Told::Scene {
-            name: scene.name.clone(),
-            notes: scene.notes.clone(),
-            warnings: scene.warnings.clone(),
+            name: shortened(&scene.name),
+            notes: some(&scene.notes),
+            warnings: some(&scene.warnings),
             duration_secs: scene.animation.duration_secs,
-            cameras: scene.cameras.iter().enumerate().map(name).collect(),
+            cameras: scene.cameras.iter().take(MOST_TEXTS).enumerate().map(name).collect(),
         }
     }
 

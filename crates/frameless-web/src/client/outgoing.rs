@@ -30,6 +30,8 @@ pub(super) struct Outgoing {
     credit: f64,
     // Of atlases.
     memory: Vec<u8>,
+    // The last of the client's inputs that it has been shown.
+    input: u32,
 }
 
 /// How much may be sent, and to whom.
@@ -61,6 +63,7 @@ impl Outgoing {
             cost: FIRST_GUESS,
             credit: 0.0,
             memory: Vec::new(),
+            input: 0,
         }
     }
 
@@ -87,6 +90,10 @@ impl Outgoing {
         };
         self.learn(chosen.lossless, chosen.tiles.len(), payload.len(), room.window);
         self.seen.sent(&picture, &chosen, times.now_ms);
+        // An input is shown by what it changed, and not by what was refined meanwhile.
+        if !chosen.before_changes {
+            self.input = picture.input_of(room.client);
+        }
         let header = TilesHeader {
             codec,
             lossless: chosen.lossless,
@@ -96,7 +103,7 @@ impl Outgoing {
             height: picture.size.height as u16,
             side: SIDE as u16,
             picture: picture.number,
-            input: picture.input_of(room.client),
+            input: self.input,
             columns: atlas.columns,
             tiles: chosen.tiles,
         };

@@ -36,6 +36,10 @@ impl<W: Send + 'static> Hub<W> {
             let text = "this renderer has but its own scene".to_owned();
             return self.roster.notice_to(client, Level::Error, text);
         }
+        if self.opening.is_some() {
+            let text = "another scene is being opened; try again then".to_owned();
+            return self.roster.notice_to(client, Level::Error, text);
+        }
         let open = |name: &str| builtin(name).ok_or_else(|| anyhow!("{name}: no such scene"));
         self.open(name.to_owned(), open, None);
     }
@@ -59,7 +63,7 @@ impl<W: Send + 'static> Hub<W> {
         self.open(name, open, Some(answer));
     }
 
-    /// What was being opened before is forgotten.
+    /// While nothing else is being opened.
     fn open(
         &mut self,
         name: String,

@@ -65,6 +65,8 @@ pub(crate) struct Chosen {
     pub(crate) tiles: Vec<u16>,
     /// Exactly.
     pub(crate) lossless: bool,
+    /// What has changed is still to come.
+    pub(crate) before_changes: bool,
     /// The canvas is the published picture, once all before this is drawn.
     pub(crate) all_exact: bool,
     /// When there will be something to refine, if nothing changes before.
@@ -120,6 +122,7 @@ impl Seen {
             }
         }
         chosen.lossless = !resting.is_empty() && (moving.is_empty() || refine);
+        chosen.before_changes = chosen.lossless && !moving.is_empty();
         if chosen.lossless {
             // Row-major, so that neighbours stay neighbours.
             resting.truncate(exact.clamp(1, MOST_TILES));

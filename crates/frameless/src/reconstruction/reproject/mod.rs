@@ -64,7 +64,7 @@ impl Reproject {
     /// Nothing kept yet.
     pub fn new(options: ReprojectOptions) -> Reproject {
         let cells = if options.deep { 2 } else { 1 };
-        Reproject {
+        let mut new = Reproject {
             options,
             cells,
             store: Store::new(Size::new(1, 1), cells),
@@ -85,19 +85,26 @@ impl Reproject {
             edges: Vec::new(),
             covered: Vec::new(),
             no_rates: None,
-        }
+        };
+        new.begin(Size::new(1, 1));
+        new
+    }
+
+    /// Nothing kept in a picture of that size.
+    fn begin(&mut self, size: Size) {
+        self.store = Store::new(size, self.cells);
+        self.warp = Default::default();
+        self.refreshes = 0;
+        self.carried = Tick::default();
+        self.shown.clear();
+        self.settled.fit(size);
+        self.covers.fit(size);
+        self.no_rates = None;
     }
 
     fn fit(&mut self, size: Size) {
         if self.store.layout.size != size {
-            self.store = Store::new(size, self.cells);
-            self.warp = Default::default();
-            self.refreshes = 0;
-            self.carried = Tick::default();
-            self.shown.clear();
-            self.settled.fit(size);
-            self.covers.fit(size);
-            self.no_rates = None;
+            self.begin(size);
         }
     }
 
