@@ -10,7 +10,7 @@ import pytest
 
 import frameless
 from conftest import pixel_centres, srgb
-from frameless import Scene, compare, compare_file, metrics, plot, save_png
+from frameless import BuiltinSampler, Scene, compare, compare_file, metrics, plot, save_png
 
 SHARED = Path(__file__).resolve().parents[2] / "../shared/scenes"
 

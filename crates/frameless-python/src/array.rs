@@ -45,8 +45,7 @@ pub(crate) fn is_regular(array: &Bound<'_, PyUntypedArray>) -> PyResult<bool> {
 
 /// The same numbers in memory of their own.
 fn contiguous<'py>(array: &Bound<'py, PyUntypedArray>) -> PyResult<Bound<'py, PyUntypedArray>> {
-    let numpy = array.py().import("numpy")?;
-    Ok(numpy.call_method1("array", (array, array.dtype(), true, "C"))?.cast_into()?)
+    Ok(array.call_method1("copy", ("C",))?.cast_into()?)
 }
 
 fn wrong_shape(name: &str, wanted: &[usize], array: &Bound<'_, PyUntypedArray>) -> PyErr {
