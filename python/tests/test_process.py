@@ -54,13 +54,6 @@ def test_threads_may_share_a_session() -> None:
         session.speed = 1.0
         assert session.probability() is not None
 
-    sizes = iter(range(10**9))
-
-    def resize() -> None:
-        session.resize((64, 40 + next(sizes) % 8))
-        time.sleep(0.01)
-
-    # Answers to the same batch from several threads: each sample once.
     threads = [threading.Thread(target=guarded, args=[work]) for work in (trace, trace, trace, look, steer)]
     [thread.start() for thread in threads]
     time.sleep(1.0)
@@ -72,6 +65,7 @@ def test_threads_may_share_a_session() -> None:
 
 
 def test_parts_of_a_batch_from_many_threads_are_kept_once() -> None:
+    # Each sample once, whoever comes first.
     session = frameless.Session((64, 48), batch=3_000, sampler="permutation")
     batch = next(iter(session))
     rgb = pattern(batch.x, batch.y, 0.0, None)
@@ -125,7 +119,9 @@ LONG = {
 @pytest.mark.parametrize("what", LONG)
 def test_ctrl_c_stops_within_half_a_second(what: str) -> None:
     code = (
-        "import os, time, numpy, frameless\n"
+        "import os, signal, time, numpy, frameless\n"
+        # Who is started in the background is started deaf to Ctrl-C.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "print('ready', flush=True)\n"
         f"try:\n    {LONG[what]}\n"
         "except KeyboardInterrupt:\n    print('stopped', time.time(), flush=True)\n    os._exit(0)"

@@ -35,6 +35,9 @@ pub(crate) fn named(
     }
 }
 
+/// That a sampler is asked for at once.
+const MOST_PIXELS: usize = 1 << 24;
+
 /// What was given as a sampler: a name, one of ours, or any object with a method `choose`.
 pub(crate) fn from_python(
     given: &Bound<'_, PyAny>,
@@ -99,6 +102,10 @@ impl BuiltinSampler {
         canvas: &PyCanvas,
         count: usize,
     ) -> PyResult<Bound<'py, PyArray1<u32>>> {
+        if count > MOST_PIXELS {
+            let message = format!("count: wanted at most {MOST_PIXELS}, got {count}");
+            return Err(PyValueError::new_err(message));
+        }
         let pixels = canvas.shared.with(py, |state| {
             let mut requests = Vec::new();
             let canvas = state.engine.canvas();

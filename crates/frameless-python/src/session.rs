@@ -71,6 +71,9 @@ fn finite(name: &str, value: f64) -> PyResult<f64> {
     }
 }
 
+// Samples per second: a batch of a millisecond must fit into memory.
+const FASTEST_SIMULATED: f64 = 1e10;
+
 fn length(batch: Option<usize>, batch_ms: f64) -> PyResult<Length> {
     match batch {
         None => Ok(Length::Learned(BatchLength::new(1e-3 * positive("batch_ms", batch_ms)?))),
@@ -149,6 +152,11 @@ impl Session {
                 return Err(PyValueError::new_err(
                     "simulated: a simulated clock has its own batches and its own rate; leave out batch and budget",
                 ));
+            }
+            Some(rate) if rate > FASTEST_SIMULATED => {
+                let message =
+                    format!("simulated: wanted at most {FASTEST_SIMULATED:e}, got {rate}");
+                return Err(PyValueError::new_err(message));
             }
             Some(rate) => Clock::simulated(positive("simulated", rate)?),
         };
@@ -263,6 +271,13 @@ impl Session {
     fn place(&self, py: Python<'_>, world_from_object: &Bound<'_, PyAny>) -> PyResult<()> {
         let matrices = array::matrices("world_from_object", world_from_object)?;
         let placed = |(i, rows): (usize, &[[f32; 4]; 4])| {
+            if rows[3] != [0.0, 0.0, 0.0, 1.0] {
+                let message = format!(
+                    "world_from_object: wanted last rows of (0, 0, 0, 1), got {:?} for object {i}; transposed?",
+                    rows[3]
+                );
+                return Err(PyValueError::new_err(message));
+            }
             let matrix = Affine3A::from_mat4(Mat4::from_cols_array_2d(rows).transpose());
             Placed::new(matrix).ok_or_else(|| {
                 PyValueError::new_err(format!(

@@ -253,6 +253,8 @@ impl Connection {
         let newest = self.hub.pictures.borrow().clone();
         let Some(newest) = newest else { return Ok(()) };
         let exact = self.exact.as_ref().filter(|exact| exact.number == newest.number);
+        // Of no use to whoever has not all of it. Worked out before the status is held: the hub would wait for it.
+        let crc = exact.map_or(0, |exact| exact.crc());
         let message = {
             let newest_status = self.hub.statuses.borrow();
             let Some(status) = &newest_status.status else { return Ok(()) };
@@ -262,8 +264,7 @@ impl Connection {
                 bytes_per_sec: self.status.quarters.iter().sum::<u64>() as u32,
                 generation: newest.generation,
                 picture: newest.number,
-                // Of no use to whoever has not all of it, and it costs a pass over the picture.
-                crc: exact.map_or(0, |exact| exact.crc()),
+                crc,
                 ..outgoing::status(status, newest.size.pixels())
             }
         };

@@ -15,7 +15,8 @@ use std::time::{Duration, Instant};
 use anyhow::bail;
 use frameless::Size;
 use frameless_session::{
-    Command, Drawn, Helm, Picture, RenderThread, Report, Session, Settings, Stage, Status,
+    Command, Drawn, Helm, Picture, PictureSize, RenderThread, Report, Session, Settings, Stage,
+    Status,
 };
 use tokio::sync::{mpsc, watch};
 
@@ -297,7 +298,11 @@ impl<W: Send + 'static> Hub<W> {
     /// The picture is as large as the driver's page has room for.
     fn follow_place(&mut self) {
         let place = self.roster.driver().and_then(|driver| self.places.get(&driver));
-        let Some(&place) = place else { return };
+        // A fixed size needs no place.
+        let place = place
+            .copied()
+            .or(matches!(self.settings.picture, PictureSize::Fixed(_)).then_some([0; 2]));
+        let Some(place) = place else { return };
         let size = settings::size_in(&self.settings, place);
         if size != self.size {
             self.size = size;

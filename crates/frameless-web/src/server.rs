@@ -14,6 +14,7 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::TcpStream;
 use tokio::sync::{Semaphore, mpsc};
 use tokio::time::timeout;
+use tokio_io_timeout::TimeoutStream;
 use tokio_rustls::TlsAcceptor;
 
 use crate::guard::Guard;
@@ -164,8 +165,9 @@ impl Server {
             // More than that: closed at once.
             let Ok(place) = Arc::clone(&connections).try_acquire_owned() else { continue };
             let (router, tls) = (router.clone(), self.tls.clone());
+            let stalled = self.options.stalled;
             tokio::spawn(async move {
-                converse(stream, tls, router).await;
+                converse(stream, stalled, tls, router).await;
                 drop(place);
             });
         }
@@ -173,9 +175,12 @@ impl Server {
 }
 
 /// One connection, to its end. That it breaks off is its own affair.
-async fn converse(stream: TcpStream, tls: Option<TlsAcceptor>, router: Router) {
+async fn converse(stream: TcpStream, stalled: Duration, tls: Option<TlsAcceptor>, router: Router) {
     // Small messages are not to wait for others.
     stream.set_nodelay(true).ok();
+    // Who reads nothing for so long of what is there for it has gone.
+    let mut stream = Box::pin(TimeoutStream::new(stream));
+    stream.as_mut().set_write_timeout_pinned(Some(stalled));
     match tls {
         None => answer(stream, router).await,
         Some(tls) => {

@@ -113,13 +113,11 @@ impl Publisher {
         let digest_of_all = digest_of([picture.rgba.as_flattened()]);
         let stands_still = std::mem::replace(&mut self.taken, digest_of_all) == digest_of_all;
         let other_size = self.last.take_if(|last| last.size != picture.size);
-        let generation = match (&self.last, other_size) {
-            (Some(last), _) => last.generation,
-            (None, Some(other)) => other.generation.wrapping_add(1),
-            (None, None) => 1,
-        };
+        let begun = other_size.map_or([1, 1], |other| {
+            [other.number.wrapping_add(1), other.generation.wrapping_add(1)]
+        });
         let Some(last) = &self.last else {
-            let published = first(picture, generation, inputs, now);
+            let published = first(picture, begun, inputs, now);
             return self.publish(published, now);
         };
         let grid = last.grid();
@@ -145,7 +143,7 @@ impl Publisher {
         }
         let published = Published {
             number: last.number.wrapping_add(1),
-            generation,
+            generation: last.generation,
             size: picture.size,
             rgba: picture.rgba,
             digests,
@@ -170,11 +168,15 @@ impl Publisher {
 }
 
 /// Of a generation.
-fn first(picture: Picture, generation: u32, inputs: Vec<(u32, u32)>, now: Instant) -> Published {
+fn first(
+    picture: Picture,
+    [number, generation]: [u32; 2],
+    inputs: Vec<(u32, u32)>,
+    now: Instant,
+) -> Published {
     let grid = Grid::new(picture.size);
     Published {
-        // Numbers need not be without gaps: a generation begins high above the last one's.
-        number: generation.wrapping_shl(20).max(1),
+        number,
         generation,
         size: picture.size,
         digests: (0..grid.len()).map(|tile| digest(&grid, tile, &picture.rgba)).collect(),

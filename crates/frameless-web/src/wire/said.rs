@@ -183,7 +183,11 @@ impl Said {
 }
 
 fn within(what: &'static str, wanted: &'static str, is: bool) -> Result<(), WireError> {
-    if is { Ok(()) } else { Err(WireError::Value { what, wanted, came: "more".to_owned() }) }
+    if is {
+        Ok(())
+    } else {
+        Err(WireError::Value { what, wanted, came: "something else".to_owned() })
+    }
 }
 
 #[cfg(test)]
