@@ -66,7 +66,8 @@ def test_samples_go_along_with_objects() -> None:
     ("matrices", "says"),
     [
         (np.eye(4), "wanted shape (n, 4, 4), got (4, 4)"),
-        (np.zeros((2, 4, 4)), "got one for object 0 that has none"),
+        (np.diag([0, 0, 0, 1.0])[None].repeat(2, 0), "got one for object 0 that has none"),
+        (np.zeros((2, 4, 4)), "wanted last rows of (0, 0, 0, 1)"),
         (np.full((1, 4, 4), np.nan), "finite"),
         (np.eye(4, dtype=int)[None], "dtype"),
     ],
