@@ -62,8 +62,8 @@ fn no_pixel_grows_older_than_its_share_of_the_even_part_allows() {
     for kind in KINDS {
         check_oldest(kind, 83_000.0, of_plain);
     }
-    // While something is refined, a twentieth.
-    check_oldest(ReconstructionKind::default(), 400_000.0, 0.25 * of_plain);
+    // While something is refined, 3 %.
+    check_oldest(ReconstructionKind::default(), 400_000.0, 0.15 * of_plain);
 }
 
 fn check_oldest(kind: ReconstructionKind, rate: f64, least_share: f64) {

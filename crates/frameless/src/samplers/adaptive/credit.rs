@@ -4,8 +4,8 @@
 //! share of tile i of N = (1 − ε) m_i √v_i / Σ m√v + ε / N
 //! ```
 //!
-//! However much of a batch goes to refinement, the even part is a twentieth of what holes, fronts and late looks leave: no pixel is
-//! older than N pixels · 1.5 / (samples per second · 0.6 · 0.4 · 0.6 · 0.05), and that only while all three take all they may.
+//! However much of a batch goes to refinement, the even part is 3 % of what holes, fronts and late looks leave: no pixel is
+//! older than N pixels · 1.5 / (samples per second · 0.6 · 0.4 · 0.6 · 0.03), and that only while all three take all they may.
 //!
 //! The square root is the optimum for jump-like change: a pixel traced f times a second with an error that grows like v · age is
 //! off by v / 2f on average, and Σ v_i / f_i at given Σ f_i is least for f_i ∝ √v_i. m_i is how much the tile counts

@@ -45,7 +45,7 @@ const HOLE_SHARE: f32 = 0.4;
 /// The largest part of what holes leave that fronts get.
 const FRONT_SHARE: f32 = 0.6;
 /// The least part of what holes, fronts and late looks leave that is spread evenly over the picture.
-const LEAST_EVEN: f32 = 0.05;
+const LEAST_EVEN: f32 = 0.03;
 /// A tile whose v is above this is hot: fronts are everywhere in it.
 const HOT_RATE: f32 = 0.01;
 /// Where this part of the tiles is hot fronts begin to lose their share; at twice as many they have none.
