@@ -54,7 +54,9 @@ impl Reproject {
             let change = squared(rgb, before);
             if self.settled.count(request.pixel) > 0 {
                 let (rgb, is_noisy) = (kept.new[i], kept.is_noisy);
-                self.settled.verify(request.pixel, rgb, change, display, is_noisy);
+                if self.settled.verify(request.pixel, rgb, change, display, is_noisy) {
+                    self.settled.begin_around(&self.store, &self.relight, [x, y], display);
+                }
             }
             return Found { change, outdated: change > 3.0 * OUTDATED, ..found };
         }
