@@ -10,7 +10,7 @@ use crate::wire::{Choice, NamedColour, Told, VERSION};
 const COLOURS: usize = 36;
 
 /// First and once. `upload_bytes` is none where the renderer takes no scenes.
-pub(crate) fn welcome(client: u32, upload_bytes: Option<u64>) -> Told {
+pub(crate) fn welcome(client: u32, upload_bytes: Option<u64>, has_own_sampler: bool) -> Told {
     let scenes = BUILTIN_NAMES.into_iter().zip(BUILTIN_DESCRIPTIONS);
     let choice = |(name, description)| Choice { name, title: None, description };
     Told::Welcome {
@@ -19,7 +19,7 @@ pub(crate) fn welcome(client: u32, upload_bytes: Option<u64>) -> Told {
         client,
         upload_bytes: upload_bytes.unwrap_or(0),
         scenes: if upload_bytes.is_some() { scenes.map(choice).collect() } else { Vec::new() },
-        samplers: settings::samplers(),
+        samplers: settings::samplers(has_own_sampler),
         overlays: settings::overlays(),
         most_pixels: MOST_PIXELS,
     }

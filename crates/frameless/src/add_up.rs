@@ -31,7 +31,7 @@ impl AddUp {
             if n > 0 && n < wanted {
                 let looks = &mut self.looks[request.pixel as usize];
                 *looks += 1;
-                if *looks % LOOKS_PER_CHECK != 0 {
+                if !looks.is_multiple_of(LOOKS_PER_CHECK) {
                     *request =
                         Request::in_sequence(request.pixel, *looks - *looks / LOOKS_PER_CHECK);
                 }

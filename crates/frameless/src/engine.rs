@@ -47,7 +47,7 @@ struct Replaced {
 /// What the loop has done so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
-    /// Batches chosen.
+    /// Batches chosen, but for empty ones.
     pub batches: u64,
     /// Samples written to the canvas.
     pub kept: u64,
@@ -236,7 +236,7 @@ impl<T: Tracer> Engine<T> {
         }
         self.reconstruction.aim(now, &self.canvas, &mut requests);
         let (id, scene_secs) = (self.counters.batches, self.timeline.scene_secs(now));
-        self.counters.batches += 1;
+        self.counters.batches += u64::from(!requests.is_empty());
         Batch { id, now, scene_secs, size: self.canvas.size(), requests }
     }
 
@@ -453,7 +453,12 @@ impl<T: Tracer> Engine<T> {
 
     /// Let somebody else choose the pixels; the picture stays.
     pub fn set_sampler(&mut self, sampler: Box<dyn Sampler>) {
-        self.sampler = sampler;
+        self.replace_sampler(sampler);
+    }
+
+    /// As [`Engine::set_sampler`]; returns who has chosen until now.
+    pub fn replace_sampler(&mut self, sampler: Box<dyn Sampler>) -> Box<dyn Sampler> {
+        std::mem::replace(&mut self.sampler, sampler)
     }
 
     /// What has been learned of how fast each part of the picture changes; `None` if the sampler learns no such thing, or
