@@ -72,7 +72,7 @@ impl<S: Stage> Session<S> {
         self.engine.now()
     }
 
-    /// Does what the window asks for; a wish for a picture is for the caller to keep.
+    /// Does what the window asks for; a wish for a picture, or for rest, is for the caller to keep.
     pub fn apply(&mut self, command: Command<S::World>) {
         let now = self.engine.now();
         match command {
@@ -96,7 +96,8 @@ impl<S: Stage> Session<S> {
             Command::Seek(scene_secs) => self.engine.timeline_mut().seek(now, scene_secs),
             Command::Speed(speed) => self.engine.timeline_mut().set_speed(now, speed),
             Command::Mark(mark) => self.mark = mark,
-            Command::WantPicture { .. } => {}
+            // For the loop around this.
+            Command::WantPicture { .. } | Command::Rest(_) => {}
         }
     }
 

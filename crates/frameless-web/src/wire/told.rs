@@ -14,6 +14,8 @@ pub enum Told {
         program: &'static str,
         /// The client's number.
         client: u32,
+        /// By which the client is recognised: in uploads, and when it comes back after its connection was lost.
+        token: String,
         /// The largest upload; 0 where there are no scenes.
         upload_bytes: u64,
         /// The built-in scenes.
@@ -22,8 +24,6 @@ pub enum Told {
         samplers: Vec<Choice>,
         /// What may be shown instead of the picture.
         overlays: Vec<Choice>,
-        /// Of a picture.
-        most_pixels: usize,
     },
     /// Another scene is shown.
     Scene {
