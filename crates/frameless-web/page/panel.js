@@ -31,6 +31,7 @@ export class Panel {
   #state = null;
   #rate = FIRST_RATE;
   #hints = new Map();
+  #titles = new Map();
 
   /** `set(settings)` is called with those that the user has changed. */
   constructor(set) {
@@ -45,6 +46,7 @@ export class Panel {
       this.#hints.set(name, description);
       return Object.assign(option(name, name), { title: description });
     }));
+    for (const { name, title } of overlays) this.#titles.set(name, title ?? name);
     byId("overlays").replaceChildren(...overlays.map(overlayChoice));
     const first = option("", "pick …");
     byId("scenes").replaceChildren(first, ...scenes.map(({ name, description }) => {
@@ -71,10 +73,15 @@ export class Panel {
     else setTimeout(() => this.#state && this.show(this.#state, !byId("controls").disabled), HANDS_OFF_MS);
   }
 
+  /** What the panel calls an overlay. */
+  overlayTitle(name) {
+    return this.#titles.get(name) ?? name;
+  }
+
   /** Shows another overlay at once, and asks for it. */
   overlay(index) {
     const choice = byId("overlays").querySelectorAll("input")[index];
-    if (!choice || byId("controls").disabled) return;
+    if (!choice) return;
     choice.checked = true;
     this.#change({ overlay: choice.value });
   }

@@ -1,8 +1,8 @@
 //! Who is let in: the request matrix, the headers, and where the server listens.
 
-use std::io::{Read, Write};
+use std::io::Write;
 use std::net::TcpStream;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use frameless::Size;
 use frameless_web::{Options, Server};

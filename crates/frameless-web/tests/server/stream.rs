@@ -257,23 +257,21 @@ fn a_recording_goes_on_where_there_is_no_client() {
 #[test]
 fn nothing_is_traced_while_nobody_looks_and_everything_is_there_again_at_once() {
     let running = start(Options { rests_after: Duration::from_millis(200), ..options() });
-    let mut client = Client::connect(&running);
-    client.until("samples", |_, received| match received {
-        Received::Status(status) => (status.unknown == 0.0).then_some(()),
-        _ => None,
-    });
-    drop(client);
-    std::thread::sleep(Duration::from_secs(1));
-    let number = || running.get("/picture.png").header("x-picture").map(str::to_owned);
-    let before = number();
-    std::thread::sleep(Duration::from_millis(500));
-    assert_eq!(number(), before);
+    // The rate is that of the time since the picture before.
+    let status_after = |picture| {
+        Client::connect(&running).until("a status", |_, received| match received {
+            Received::Status(status) => {
+                (status.picture > picture && status.samples_per_sec > 0.0).then_some(*status)
+            }
+            _ => None,
+        })
+    };
+    let before = status_after(20);
+    std::thread::sleep(Duration::from_secs(3));
     let begin = Instant::now();
-    let mut client = Client::connect(&running);
-    let unknown = client.until("a picture", |_, received| match received {
-        Received::Status(status) => Some(status.unknown),
-        _ => None,
-    });
-    assert_eq!(unknown, 0.0, "what was traced has been kept");
-    assert!(begin.elapsed() < Duration::from_secs(5));
+    let after = status_after(before.picture + 1);
+    assert!(begin.elapsed() < Duration::from_secs(5), "{:?}", begin.elapsed());
+    assert!(after.unknown < 0.1, "what was traced has been kept: {}", after.unknown);
+    let [before, after] = [before, after].map(|status| status.samples_per_sec);
+    assert!(after < before / 3.0, "{before} samples/s, then {after} while nobody looked");
 }
