@@ -29,8 +29,12 @@ impl Roster {
     /// Who has that token.
     pub(crate) fn with_token(&self, token: &str) -> Option<u32> {
         // All are compared, so that the time taken does not tell which was right.
-        let having = self.clients.iter().filter(|(_, client)| client.token.is(token));
-        having.map(|(&client, _)| client).last()
+        self.clients.iter().fold(
+            None,
+            |found, (&number, client)| {
+                if client.token.is(token) { Some(number) } else { found }
+            },
+        )
     }
 
     /// `heir` takes the place of a client whose connection is lost, and the helm if that had it.
