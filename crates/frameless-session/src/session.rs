@@ -42,7 +42,7 @@ impl<S: Stage> Session<S> {
         let sampler = settings.sampler.build(seed);
         let mut engine = Engine::new(size, clock, sampler, Counted::new(stage));
         engine.set_budget(settings.samples_per_sec);
-        engine.set_display(Display::new(settings.exposure_stops));
+        engine.set_display(settings.display());
         engine.set_reconstruction(settings.reconstruction.build());
         let held = Shown::new(engine.canvas(), *engine.display());
         let (heat_maps, throughput) = (HeatMaps::default(), Throughput::default());
@@ -130,8 +130,8 @@ impl<S: Stage> Session<S> {
         if new.samples_per_sec != old.samples_per_sec {
             self.engine.set_budget(new.samples_per_sec);
         }
-        if new.exposure_stops != old.exposure_stops {
-            self.engine.set_display(Display::new(new.exposure_stops));
+        if new.display() != old.display() {
+            self.engine.set_display(new.display());
         }
         if new.reconstruction != old.reconstruction {
             self.engine.set_reconstruction(new.reconstruction.build());

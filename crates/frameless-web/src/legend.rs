@@ -22,6 +22,7 @@ pub(crate) fn welcome(client: u32, token: &Secret, upload_bytes: Option<u64>) ->
         upload_bytes: upload_bytes.unwrap_or(0),
         scenes: if upload_bytes.is_some() { scenes.map(choice).collect() } else { Vec::new() },
         samplers: settings::samplers(),
+        tone_maps: settings::tone_maps(),
         overlays: settings::overlays(),
     }
 }

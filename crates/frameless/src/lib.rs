@@ -46,6 +46,7 @@ mod tile;
 mod tile_pdf;
 mod time;
 mod timeline;
+mod tone_map;
 mod tracer;
 mod weights;
 mod wide;
@@ -78,5 +79,6 @@ pub use reconstruction::{
     Filter, Findings, Hold, Kept, Reconstruction, ReconstructionKind, Refresh, Reproject,
     ReprojectOptions, ReprojectStage, hold, hold_into,
 };
+pub use tone_map::ToneMap;
 
 pub use rng::Rng;

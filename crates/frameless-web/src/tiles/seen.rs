@@ -3,7 +3,7 @@
 //! A tile that has visibly changed is sent lossily, those first that changed most times waited longest. Once it has been quiet it is sent
 //! exactly. Differences that nobody sees are sent exactly, too, and ever more seldom while the rest of the picture moves.
 
-use super::{Grid, Published};
+use super::{Grid, Mean, Published};
 
 /// A change that is worth JPEG: mean squared difference of a tile's pixels (Σ over the channels, 8 bits each), five steps in each channel. JPEG's own error
 /// is half of this: below, much would be sent to gain little, and a tile that is exact by now would become worse. Seven pixels in the
@@ -19,7 +19,7 @@ const NEVER: f64 = 3.0 * 255.0 * 255.0;
 /// In one message. 1536 · 16 · 16 pixels are 1.2 MB of RGB, which each client may hold while it is encoded.
 const MOST_TILES: usize = 1536;
 
-/// Of one client. 48 bytes per tile.
+/// Of one client. 56 bytes per tile.
 pub(crate) struct Seen {
     generation: u32,
     tiles: Vec<Tile>,
@@ -38,6 +38,8 @@ struct Tile {
     latest: u32,
     /// Since when it has been different in a way that is seen; 0: it is not.
     waiting_ms: u64,
+    /// Of what was sent, if that had no detail.
+    mean: Option<Mean>,
     sent: bool,
     exact: bool,
     exactly: u8,
@@ -149,6 +151,7 @@ impl Seen {
             };
             tile.digest = picture.digests[usize::from(index)];
             tile.change_sum = picture.change_sums[usize::from(index)];
+            tile.mean = picture.means[usize::from(index)];
             (tile.sent_ms, tile.waiting_ms) = (now_ms, 0);
             (tile.sent, tile.exact) = (true, chosen.lossless);
         }
@@ -172,7 +175,9 @@ impl Tile {
             true => changed as f64 / f64::from(grid.pixels(index)),
             false => NEVER,
         };
-        if !same && change >= WORTH_LOSSY {
+        let means = self.mean.zip(picture.means[index]);
+        let has_another_tone = means.is_some_and(|(sent, now)| now.is_seen_beside(sent));
+        if !same && (change >= WORTH_LOSSY || has_another_tone) {
             if self.waiting_ms == 0 {
                 self.waiting_ms = now_ms;
             }
@@ -336,6 +341,22 @@ mod tests {
     }
 
     #[test]
+    fn what_has_no_detail_is_followed_step_by_step() {
+        let (mut scene, mut seen) = (Scene::new(), Seen::nothing());
+        let mut rgba = scene.rgba.clone();
+        // Tile 3 has detail.
+        rgba.iter_mut().skip(3 * SIDE as usize).step_by(4 * SIDE as usize).for_each(|p| p[0] = 200);
+        scene.rgba = rgba;
+        let shown = scene.show();
+        send(&mut seen, &shown, 1, PLENTY);
+        send(&mut seen, &shown, 500, PLENTY);
+        // A slow fade, each step of which is far less than is worth sending anywhere else.
+        scene.rgba.iter_mut().for_each(|[r, g, b, _]| (*r, *g, *b) = (*r + 1, *g + 1, *b + 1));
+        let faded = send(&mut seen, &scene.show(), 1000, PLENTY);
+        assert_eq!((faded.tiles, faded.lossless), (vec![0, 1, 2], false));
+    }
+
+    #[test]
     fn another_generation_begins_anew() {
         let mut scene = Scene::new();
         let mut seen = exact_everywhere(&mut scene);
@@ -354,7 +375,7 @@ mod tests {
         let shown = published(Publisher::new(now).take(black, Vec::new(), false, now));
         let mut seen = Seen::nothing();
         assert_eq!(seen.choose(&shown, at(1), [usize::MAX; 2], true).tiles.len(), MOST_TILES);
-        assert_eq!(size_of::<Tile>(), 48);
-        assert!(seen.bytes() < 1_600_000, "{} bytes for the largest picture", seen.bytes());
+        assert_eq!(size_of::<Tile>(), 56);
+        assert!(seen.bytes() < 1_900_000, "{} bytes for the largest picture", seen.bytes());
     }
 }

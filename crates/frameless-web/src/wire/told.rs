@@ -22,6 +22,8 @@ pub enum Told {
         scenes: Vec<Choice>,
         /// Who may choose the pixels.
         samplers: Vec<Choice>,
+        /// How what is brighter than white may be brought into range.
+        tone_maps: Vec<Choice>,
         /// What may be shown instead of the picture.
         overlays: Vec<Choice>,
     },
@@ -139,6 +141,8 @@ pub struct SettingsState {
     pub samples_per_sec: Option<f64>,
     /// In stops.
     pub exposure_stops: f32,
+    /// By its name.
+    pub tone_map: &'static str,
     /// By its name.
     pub overlay: &'static str,
     /// `window`, `whole-window`, or a size.

@@ -116,6 +116,7 @@ fn every_setting_can_be_set_and_is_told() {
         (r#"{"type": "settings", "samples_per_sec": 5000}"#, "samples_per_sec", "5000.0"),
         (r#"{"type": "settings", "samples_per_sec": null}"#, "samples_per_sec", "null"),
         (r#"{"type": "settings", "exposure_stops": -1}"#, "exposure_stops", "-1.0"),
+        (r#"{"type": "settings", "tone_map": "aces"}"#, "tone_map", "\"aces\""),
     ] {
         client.say(say);
         let want: serde_json::Value = serde_json::from_str(want).unwrap();
