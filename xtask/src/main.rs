@@ -23,7 +23,7 @@ Project chores. Run them from anywhere in the checkout:
                              Python package with its examples
   cargo xtask smoke-window   only the window: opens it on a virtual screen and looks at a screenshot
   cargo xtask smoke-report   only a small comparison: nothing got worse, and its report opens in a browser
-  cargo xtask smoke-web      only the web page: what it must do, in a headless browser
+  cargo xtask smoke-web      only the web page: what it must do, in headless Chromium and Firefox
   cargo xtask measure-web    the web page's latency, traffic and cost, in a headless browser; minutes, and a quiet machine
   cargo xtask python         only the Python package: wheel, tests, types, reference, examples, notebook
   cargo xtask help           this text

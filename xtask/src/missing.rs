@@ -89,6 +89,14 @@ pub(crate) fn to_open_a_report() -> Vec<Missing> {
     vec![debian("Chromium", "the report is opened in a browser", "chromium")]
 }
 
+/// Needed to open the web page in another browser.
+pub(crate) fn to_open_firefox() -> Vec<Missing> {
+    if ["firefox", "firefox-esr"].iter().any(|name| runs(name, &["--version"])) {
+        return Vec::new();
+    }
+    vec![debian("Firefox", "the web page is opened in it, too", "firefox-esr")]
+}
+
 /// Needed to run the examples with Mitsuba.
 pub(crate) fn to_run_mitsuba() -> Missing {
     debian("LLVM 16 or newer", "Mitsuba compiles its kernels with it", "libllvm19")

@@ -26,6 +26,7 @@ pub(crate) fn everything() -> bool {
     steps.step("a comparison", || program::a_comparison(&program()?, &out_dir("comparison")?));
     steps.step("the report in a browser", open_report);
     steps.step("the web page", || web::page(&program()?, &out_dir("web")?));
+    steps.step("the web page in Firefox", || web::in_firefox(&program()?, &out_dir("firefox")?));
     steps.step("the window", || open_window(&program()?));
     package::steps(&mut steps, out_dir);
     steps.finish()
@@ -42,6 +43,7 @@ pub(crate) fn only_python() -> bool {
 pub(crate) fn only_web_page() -> bool {
     let mut steps = Steps::new(in_ci());
     steps.step("the web page", || web::page(&build()?, &out_dir("web")?));
+    steps.step("the web page in Firefox", || web::in_firefox(&program()?, &out_dir("firefox")?));
     steps.finish()
 }
 
@@ -77,6 +79,7 @@ fn prerequisites() -> Result<Done> {
     let mut later = missing::to_open_a_window();
     later.extend(missing::to_read_a_video());
     later.extend(missing::to_open_a_report());
+    later.extend(missing::to_open_firefox());
     for missing in &later {
         eprintln!("note: {missing}");
     }

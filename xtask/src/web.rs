@@ -1,4 +1,4 @@
-//! The web page in a headless browser: what it must do, and how fast it does it. Python scripts in the project's `.venv`.
+//! The web page in headless browsers: what it must do, and how fast it does it. Python scripts in the project's `.venv`.
 
 use std::path::Path;
 use std::time::Duration;
@@ -6,7 +6,7 @@ use std::time::Duration;
 use anyhow::{Result, ensure};
 
 use crate::command::{cargo, output_within, run};
-use crate::missing;
+use crate::missing::{self, Missing};
 use crate::python::{install, python};
 use crate::steps::Done;
 
@@ -17,7 +17,7 @@ const CHECKS_WITHIN: Duration = Duration::from_secs(270);
 
 /// Lets a browser do everything that the page offers. Screenshots stay in `out`.
 pub(crate) fn page(program: &Path, out: &Path) -> Result<Done> {
-    if let Some(reason) = cannot_run() {
+    if let Some(reason) = lacks(missing::to_open_a_report()) {
         return Ok(Done::skipped(reason));
     }
     let mut checks = python();
@@ -29,9 +29,21 @@ pub(crate) fn page(program: &Path, out: &Path) -> Result<Done> {
     Ok(Done::passed(last_line(&text)))
 }
 
+/// Lets Firefox do what browsers do each in their own way.
+pub(crate) fn in_firefox(program: &Path, out: &Path) -> Result<Done> {
+    if let Some(reason) = lacks(missing::to_open_firefox()) {
+        return Ok(Done::skipped(reason));
+    }
+    let mut checks = python();
+    checks.arg(format!("{FOLDER}/check_firefox.py")).arg(program).arg(out);
+    let output = output_within(&mut checks, CHECKS_WITHIN)?;
+    ensure!(output.status.success(), "{}", error_text(&output.stderr));
+    Ok(Done::passed(last_line(&String::from_utf8_lossy(&output.stdout))))
+}
+
 /// Measures latency, traffic and cost with an optimised program. The numbers are printed, and stay in `out`.
 pub(crate) fn measure(out: &Path) -> Result<Done> {
-    if let Some(reason) = cannot_run() {
+    if let Some(reason) = lacks(missing::to_open_a_report()) {
         return Ok(Done::skipped(reason));
     }
     run(cargo(&["build", "--release", "--bin", "frameless"]))?;
@@ -42,10 +54,9 @@ pub(crate) fn measure(out: &Path) -> Result<Done> {
     Ok(Done::passed(out.display().to_string()))
 }
 
-/// Why there is nothing to run with, if so.
-fn cannot_run() -> Option<String> {
-    let browser = missing::to_open_a_report().into_iter().next();
-    if let Some(missing) = missing::to_make_a_venv().or(browser) {
+/// Why there is nothing to run with, if so: a browser or Python is missing.
+fn lacks(browser: Vec<Missing>) -> Option<String> {
+    if let Some(missing) = missing::to_make_a_venv().or(browser.into_iter().next()) {
         return Some(format!("the web page: {missing}"));
     }
     let requirements = format!("{FOLDER}/requirements.txt");

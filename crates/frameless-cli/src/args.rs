@@ -5,7 +5,7 @@ mod serve;
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Parser, Subcommand};
-use frameless::{ReconstructionKind, Size};
+use frameless::{ReconstructionKind, Size, ToneMap};
 use frameless_scene::{AnimationChoice, Pick};
 use frameless_trace::{Integrator, Settings};
 
@@ -140,6 +140,10 @@ pub(crate) struct LookArgs {
     #[arg(allow_negative_numbers = true)]
     pub(crate) exposure: f32,
 
+    /// How what is brighter than white is brought into range: clip, neutral (Khronos PBR Neutral) or aces (as fitted by Hill)
+    #[arg(long, value_name = "NAME", default_value = "clip", value_parser = parse::tone_map)]
+    pub(crate) tone_map: ToneMap,
+
     #[command(flatten)]
     pub(crate) light: LightArgs,
 
@@ -181,6 +185,7 @@ impl Default for ViewArgs {
             rate: None,
             camera: 0,
             exposure: 0.0,
+            tone_map: ToneMap::default(),
             light: LightArgs::default(),
             threads: 0,
             seed: 1,
@@ -256,6 +261,10 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "STOPS", default_value = "0", value_parser = parse::stops)]
     #[arg(allow_negative_numbers = true)]
     pub(crate) exposure: f32,
+
+    /// How what is brighter than white is brought into range: clip, neutral (Khronos PBR Neutral) or aces (as fitted by Hill)
+    #[arg(long, value_name = "NAME", default_value = "clip", value_parser = parse::tone_map)]
+    pub(crate) tone_map: ToneMap,
 
     #[command(flatten)]
     pub(crate) light: LightArgs,
@@ -377,8 +386,8 @@ mod tests {
             (default.reconstruction, default.temporal)
         );
         assert_eq!(
-            (typed.exposure, typed.threads, typed.seed),
-            (default.exposure, default.threads, default.seed)
+            (typed.exposure, typed.tone_map, typed.threads, typed.seed),
+            (default.exposure, default.tone_map, default.threads, default.seed)
         );
     }
 }

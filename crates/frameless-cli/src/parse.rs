@@ -1,6 +1,6 @@
 //! From the text of an argument to a checked value.
 
-use frameless::{ReconstructionKind, Size};
+use frameless::{ReconstructionKind, Size, ToneMap};
 
 /// Longest side of a picture: what GPUs take as a texture.
 const MAX_SIDE: u32 = 16_384;
@@ -50,6 +50,11 @@ pub(crate) fn fraction(text: &str) -> Result<f32, String> {
         Ok(number) if (0.0..=1.0).contains(&number) => Ok(number as f32),
         _ => Err("wanted a number from 0 to 1".into()),
     }
+}
+
+/// A tone mapping by its name.
+pub(crate) fn tone_map(text: &str) -> Result<ToneMap, String> {
+    ToneMap::from_name(text).ok_or_else(|| "wanted clip, neutral or aces".into())
 }
 
 /// A reconstruction by its name.

@@ -29,7 +29,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     waiting.set_style(bar());
     let radiance = frameless_trace::render_still(&world, &still, &pool, || waiting.inc(1));
     waiting.set_message("writing");
-    let display = Display::new(args.exposure);
+    let display = Display::new(args.exposure).with_tone_map(args.tone_map);
     let rgba = radiance.into_iter().map(|rgb| display.encode_rgba8(rgb)).collect();
     output::write_png(&args.out, args.size.width, args.size.height, rgba)?;
     waiting.finish_and_clear();

@@ -75,6 +75,7 @@ pub(crate) fn settings(args: &LookArgs) -> Result<Settings, Failure> {
         reconstruction: args.reconstruction.unwrap_or(default.reconstruction),
         samples_per_sec: args.rate,
         exposure_stops: args.exposure,
+        tone_map: args.tone_map,
         picture: args.size.map_or(default.picture, PictureSize::Fixed),
         ..default
     })

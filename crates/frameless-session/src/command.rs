@@ -24,6 +24,8 @@ pub enum Command<W> {
     Seek(f64),
     /// Seconds of the scene per second.
     Speed(f64),
+    /// Nobody looks (or somebody does again): the loop stands still, and what it holds stays. The scene's time goes on.
+    Rest(bool),
     /// A number that pictures give back: those which show the commands before it. Somebody waits for them: the next one is hurried.
     Mark(u64),
     /// A picture is wanted at the next refresh. Gives an old picture's memory back, and says what painting costs.

@@ -83,6 +83,7 @@ fn run<S: Stage>(
 ) {
     let mut pace = Pace::default();
     let mut wanted = None;
+    let mut rests = false;
     let mut next_error = Time::ZERO;
     // Sending fails once the window is gone; then the channel of commands is closed, too.
     let report = |report| {
@@ -94,7 +95,12 @@ fn run<S: Stage>(
         // settings, too, and each may cost a sampler.
         let (mut size, mut settings) = (None, None);
         loop {
-            match commands.try_recv() {
+            let next = match rests {
+                true => commands.recv().map_err(|_| TryRecvError::Disconnected),
+                false => commands.try_recv(),
+            };
+            match next {
+                Ok(Command::Rest(on)) => rests = on,
                 Ok(Command::Size(wanted)) => size = Some(wanted),
                 Ok(Command::Settings(wanted)) => settings = Some(wanted),
                 Ok(Command::WantPicture { memory, paint_secs }) => {
@@ -179,6 +185,24 @@ mod tests {
         thread.send(Command::Play(false));
         thread.send(Command::Mark(7));
         assert_eq!(picture(&thread).mark, 7);
+    }
+
+    #[test]
+    fn at_rest_nothing_is_traced_and_everything_stays() {
+        let thread = start();
+        while picture(&thread).status.ages.unknown > 0 {}
+        thread.send(Command::Rest(true));
+        // A renderer that would fail at once, if it were asked.
+        thread.send(Command::Scene(f32::NAN));
+        thread.send(Command::WantPicture { memory: Vec::new(), paint_secs: 0.0 });
+        std::thread::sleep(std::time::Duration::from_millis(100));
+        assert!(matches!(thread.report(), Ok(None)));
+        thread.send(Command::Scene(1.0));
+        thread.send(Command::Rest(false));
+        let Ok(Report::Picture(picture)) = next(&thread) else { panic!("no picture") };
+        assert_eq!(picture.status.ages.unknown, 0);
+        thread.send(Command::Rest(true));
+        drop(thread);
     }
 
     #[test]

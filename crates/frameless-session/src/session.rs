@@ -51,7 +51,7 @@ impl<S: Stage> Session<S> {
         let sampler = settings.sampler.build(seed);
         let mut engine = Engine::new(size, clock, sampler, Counted::new(stage));
         engine.set_budget(settings.samples_per_sec);
-        engine.set_display(Display::new(settings.exposure_stops));
+        engine.set_display(settings.display());
         engine.set_reconstruction(settings.reconstruction.build());
         let held = Shown::new(engine.canvas(), *engine.display());
         let (heat_maps, throughput) = (HeatMaps::default(), Throughput::default());
@@ -91,7 +91,7 @@ impl<S: Stage> Session<S> {
         self.engine.now()
     }
 
-    /// Does what the window asks for; a wish for a picture is for the caller to keep.
+    /// Does what the window asks for; a wish for a picture, or for rest, is for the caller to keep.
     pub fn apply(&mut self, command: Command<S::World>) {
         let now = self.engine.now();
         match command {
@@ -115,7 +115,8 @@ impl<S: Stage> Session<S> {
             Command::Seek(scene_secs) => self.engine.timeline_mut().seek(now, scene_secs),
             Command::Speed(speed) => self.engine.timeline_mut().set_speed(now, speed),
             Command::Mark(mark) => self.mark = mark,
-            Command::WantPicture { .. } => {}
+            // For the loop around this.
+            Command::WantPicture { .. } | Command::Rest(_) => {}
         }
     }
 
@@ -138,8 +139,8 @@ impl<S: Stage> Session<S> {
         if new.samples_per_sec != old.samples_per_sec {
             self.engine.set_budget(new.samples_per_sec);
         }
-        if new.exposure_stops != old.exposure_stops {
-            self.engine.set_display(Display::new(new.exposure_stops));
+        if new.display() != old.display() {
+            self.engine.set_display(new.display());
         }
         if new.reconstruction != old.reconstruction {
             self.engine.set_reconstruction(new.reconstruction.build());

@@ -1,6 +1,6 @@
 //! What the user can set, apart from the camera and the time.
 
-use frameless::{ReconstructionKind, SamplerKind, Size};
+use frameless::{Display, ReconstructionKind, SamplerKind, Size, ToneMap};
 
 /// Everything that may be set while the picture runs. No change of it clears the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,6 +15,8 @@ pub struct Settings {
     pub samples_per_sec: Option<f64>,
     /// Radiance is multiplied by 2^`exposure_stops` before display.
     pub exposure_stops: f32,
+    /// How what is brighter than white is brought into range.
+    pub tone_map: ToneMap,
     /// What is shown instead of the picture.
     pub overlay: Overlay,
     /// How many pixels the picture has.
@@ -29,9 +31,17 @@ impl Default for Settings {
             reconstruction: ReconstructionKind::default(),
             samples_per_sec: None,
             exposure_stops: 0.0,
+            tone_map: ToneMap::default(),
             overlay: Overlay::None,
             picture: PictureSize::default(),
         }
+    }
+}
+
+impl Settings {
+    /// How radiance becomes a display colour.
+    pub fn display(&self) -> Display {
+        Display::new(self.exposure_stops).with_tone_map(self.tone_map)
     }
 }
 

@@ -4,7 +4,7 @@ use eframe::egui::{
     Align, ComboBox, Key, Layout, RichText, ScrollArea, Slider, TextEdit, Ui, Widget, vec2,
 };
 use frameless::{
-    DEFAULT_TILE, DEFAULT_W_D, ReconstructionKind, ReprojectOptions, SamplerKind, Size,
+    DEFAULT_TILE, DEFAULT_W_D, ReconstructionKind, ReprojectOptions, SamplerKind, Size, ToneMap,
 };
 use frameless_scene::Scene;
 
@@ -278,6 +278,13 @@ fn metric(number: f64) -> String {
 fn picture_part(ui: &mut Ui, settings: &mut Settings) {
     let slider = fraction(Slider::new(&mut settings.exposure_stops, -8.0..=8.0));
     row(ui, "exposure", "in stops: brighter by this power of two", slider);
+    ui.horizontal(|ui| {
+        ui.label("tones").on_hover_text("how what is brighter than white is brought into range");
+        for tone_map in ToneMap::ALL {
+            let choice = ui.selectable_value(&mut settings.tone_map, tone_map, tone_map.name());
+            choice.on_hover_text(tone_map.explanation());
+        }
+    });
     let fixed = [(320, 240), (512, 384), (640, 480), (1024, 768), (1280, 720), (1920, 1080)];
     let fixed = fixed.map(|(width, height)| PictureSize::Fixed(Size::new(width, height)));
     ComboBox::from_id_salt("size")

@@ -13,6 +13,7 @@ export class Connection {
   #retry = null;
   #heard = 0;
   #received = []; // [when, bytes] of the last second
+  #token = null; // by which the server knows this page; a connection that was lost may still be there, and drive
   /** Called with {type, …}: what the server says, binary and JSON alike. */
   onMessage = () => {};
   /** Called when a connection has begun, and with a reason when it has been lost. */
@@ -31,6 +32,11 @@ export class Connection {
     if (this.#socket !== null) return;
     this.#wait = FIRST_WAIT_MS;
     this.#open();
+  }
+
+  /** No use in trying: until somebody calls `again`. */
+  pause() {
+    clearTimeout(this.#retry);
   }
 
   /** Give this connection up and begin another. */
@@ -63,7 +69,7 @@ export class Connection {
     clearTimeout(this.#retry);
     const url = new URL("stream", location.href);
     url.protocol = url.protocol.replace("http", "ws");
-    url.search = "";
+    url.search = this.#token === null ? "" : new URLSearchParams({ resume: this.#token });
     url.hash = "";
     const socket = new WebSocket(url);
     socket.binaryType = "arraybuffer";
@@ -89,7 +95,7 @@ export class Connection {
       this.#lose(error.message);
       return;
     }
-    if (message.type === "welcome") this.#wait = FIRST_WAIT_MS;
+    if (message.type === "welcome") [this.#wait, this.#token] = [FIRST_WAIT_MS, message.token];
     this.onMessage(message);
   }
 

@@ -8,18 +8,36 @@ const PX_PER_LINE = 33;
 const PINCH_PER_PX = 0.01;
 // Distances to the target per second, slow and with shift.
 const FLY_PER_SEC = [0.8, 3.0];
+// Heights of the picture per second that a key drags it: a quarter of a turn, about.
+const DRAG_PER_SEC = 0.5;
+// A second of zooming is a factor of two.
+const ZOOM_POWER_PER_SEC = 1;
 // A stall must not become a leap.
 const LONGEST_STEP_SECS = 0.1;
-const FLY_KEYS = { KeyD: [0, 1], KeyA: [0, -1], KeyE: [1, 1], KeyQ: [1, -1], KeyS: [2, 1], KeyW: [2, -1] };
+// Which motion, along which axis, which way.
+const KEYS = {
+  KeyD: ["fly", 0, 1],
+  KeyA: ["fly", 0, -1],
+  KeyE: ["fly", 1, 1],
+  KeyQ: ["fly", 1, -1],
+  KeyS: ["fly", 2, 1],
+  KeyW: ["fly", 2, -1],
+  ArrowRight: ["drag", 0, 1],
+  ArrowLeft: ["drag", 0, -1],
+  ArrowDown: ["drag", 1, 1],
+  ArrowUp: ["drag", 1, -1],
+};
+// By what is written on them: where they lie differs between keyboards. With and without shift.
+const SIGNS = { "+": ["zoom", 0, -1], "=": ["zoom", 0, -1], "-": ["zoom", 0, 1], _: ["zoom", 0, 1] };
 
 /** Calls `move(motion, when)` with some of `orbit: [x, y]`, `pan: [x, y]`, `zoom: factor`, `fly: [right, up, back]`. */
 export class Hands {
   #canvas;
   #move;
   #pointers = new Map();
-  #held = new Set();
-  #lastFlight = null;
-  #fast = false;
+  #held = new Map(); // a key's place → what it does
+  #lastStep = null;
+  #shift = false;
 
   constructor(canvas, move) {
     [this.#canvas, this.#move] = [canvas, move];
@@ -79,33 +97,33 @@ export class Hands {
     if (zoom !== 1) this.#move({ zoom }, event.timeStamp);
   }
 
-  /** A key went down or up. Returns whether it is one of those that fly. */
+  /** A key went down or up. Returns whether it is one of those that move the camera. */
   key(event, isDown) {
-    this.#fast = event.shiftKey;
-    if (!(event.code in FLY_KEYS)) return false;
-    if (!isDown) this.#held.delete(event.code);
-    else if (!event.ctrlKey && !event.metaKey && !event.altKey) this.#take(event);
+    this.#shift = event.shiftKey;
+    if (!isDown) return this.#held.delete(event.code);
+    const moves = KEYS[event.code] ?? SIGNS[event.key];
+    if (moves === undefined || event.ctrlKey || event.metaKey || event.altKey) return false;
+    const rested = this.#held.size === 0;
+    this.#held.set(event.code, moves);
+    if (rested) {
+      this.#lastStep = event.timeStamp;
+      requestAnimationFrame((now) => this.#step(now));
+    }
     return true;
   }
 
-  #take(event) {
-    const rested = this.#held.size === 0;
-    this.#held.add(event.code);
-    if (!rested) return;
-    this.#lastFlight = event.timeStamp;
-    requestAnimationFrame((now) => this.#fly(now));
-  }
-
-  #fly(now) {
+  #step(now) {
     if (this.#held.size === 0) return;
-    const secs = Math.min(Math.max(0, now - this.#lastFlight) / 1000, LONGEST_STEP_SECS);
-    this.#lastFlight = now;
-    const fly = [0, 0, 0];
-    for (const code of this.#held) {
-      const [axis, way] = FLY_KEYS[code];
-      fly[axis] += way * FLY_PER_SEC[Number(this.#fast)] * secs;
-    }
-    if (fly.some((step) => step !== 0)) this.#move({ fly }, now);
-    requestAnimationFrame((later) => this.#fly(later));
+    const secs = Math.min(Math.max(0, now - this.#lastStep) / 1000, LONGEST_STEP_SECS);
+    this.#lastStep = now;
+    const ways = { fly: [0, 0, 0], drag: [0, 0], zoom: [0] };
+    for (const [motion, axis, way] of this.#held.values()) ways[motion][axis] += way * secs;
+    const motion = {};
+    const moves = (name) => ways[name].some((way) => way !== 0);
+    if (moves("fly")) motion.fly = ways.fly.map((way) => way * FLY_PER_SEC[Number(this.#shift)]);
+    if (moves("drag")) motion[this.#shift ? "pan" : "orbit"] = ways.drag.map((way) => way * DRAG_PER_SEC);
+    if (moves("zoom")) motion.zoom = 2 ** (ways.zoom[0] * ZOOM_POWER_PER_SEC);
+    if (Object.keys(motion).length > 0) this.#move(motion, now);
+    requestAnimationFrame((later) => this.#step(later));
   }
 }

@@ -1,9 +1,9 @@
 // The keys, in a dialog.
 
 const KEYS = [
-  [["left drag", "one finger"], "orbit"],
-  [["right drag", "two fingers"], "pan"],
-  [["wheel", "pinch"], "zoom"],
+  [["left drag", "one finger", "← → ↑ ↓"], "orbit"],
+  [["right drag", "two fingers", "shift + arrow"], "pan"],
+  [["wheel", "pinch", "+", "−"], "zoom"],
   [["W", "A", "S", "D", "Q", "E"], "fly; with shift: fast"],
   [["double click", "Home"], "back to the scene's own camera"],
   [["space"], "play or pause"],
@@ -11,10 +11,10 @@ const KEYS = [
   [["1", "2", "3"], "change, source age, tile probability"],
   [["4", "5", "6"], "sampling rate, learned rate, holes"],
   [["P"], "hide or show the settings"],
-  [["I"], "save the picture as PNG"],
+  [["I"], "save the server's exact picture as PNG"],
   [["R"], "record a video, or end it and download it"],
   [["drop a .glb"], "upload and open it"],
-  [["Esc"], "dismiss messages and this list"],
+  [["Esc"], "dismiss messages and this list; keys go to the picture again"],
   [["H", "?"], "this list"],
 ];
 

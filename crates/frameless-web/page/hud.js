@@ -38,6 +38,12 @@ export function showScene({ notes, warnings }) {
   byId("hud-notes").title = warnings.join("\n");
 }
 
+/** Says that an overlay was asked for which the sampler does not know; hidden without a text. */
+export function showNoOverlay(text) {
+  byId("no-overlay").hidden = text === null;
+  write("no-overlay", text ?? "");
+}
+
 /** What an overlay's colours mean; hidden without a title. */
 export function showLegend({ title, ticks, colours, names }) {
   byId("legend").hidden = title === undefined;

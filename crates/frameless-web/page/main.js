@@ -11,7 +11,7 @@ import { Panel } from "./panel.js";
 import { Picture } from "./picture.js";
 import { VERSION } from "./protocol.js";
 import { Recorder } from "./record.js";
-import { download } from "./save.js";
+import { download, exactPng } from "./save.js";
 import * as theme from "./theme.js";
 import { Transport } from "./transport.js";
 import { Upload } from "./upload.js";
@@ -83,6 +83,7 @@ const heard = {
     status = message;
     transport.told(message.sceneSecs, message.moves);
     if (message.exact) picture.compare(message);
+    showNoOverlay();
     showHud();
   },
 
@@ -92,7 +93,7 @@ const heard = {
       return;
     }
     client = message.client;
-    upload.limit = { bytes: message.upload_bytes, client };
+    upload.limit = { bytes: message.upload_bytes, token: message.token };
     panel.offer(message);
     show("live", "live");
     sendSize();
@@ -130,16 +131,34 @@ connection.onLost = (reason) => {
   showDriver();
   byId("controls").disabled = true;
   transport.stop();
+  // Every attempt that fails comes here, too: what has been found out stays written.
+  if (byId("banner").hidden) sayLost(reason);
   show("lost", "connection lost");
-  byId("banner-text").textContent = `Connection lost${reason ? ` (${reason})` : ""}. Trying again …`;
-  findOutWhy();
+  findOutWhy(reason);
 };
 
-/** A server that has been started again has another secret: this page cannot come back by itself then. */
-async function findOutWhy() {
-  const answer = await fetch("./", { cache: "no-store" }).catch(() => null);
-  if (answer?.status === 403 && !byId("banner").hidden)
-    byId("banner-text").textContent = "The server has been started anew: open the address that it printed.";
+function sayLost(reason) {
+  showBanner(`Connection lost${reason ? ` (${reason})` : ""}. Trying again …`);
+}
+
+/** Of a WebSocket that was refused a browser tells nothing: an ordinary request is told why. */
+async function findOutWhy(reason) {
+  const answer = await fetch("clients", { cache: "no-store" }).catch(() => null);
+  if (byId("banner").hidden) return; // it is there again
+  if (answer === null) return sayLost(reason);
+  if (answer.status === 403) {
+    // The server has another secret: this page cannot come back by itself.
+    connection.pause();
+    showBanner("The server has been started anew: open the address that it printed.", false);
+    return;
+  }
+  const { clients, most } = await answer.json().catch(() => ({}));
+  if (clients >= most) showBanner(`The server is full: as many pages as may be (${most}) are looking. Trying again …`);
+}
+
+function showBanner(text, tries = true) {
+  if (byId("banner-text").textContent !== text) byId("banner-text").textContent = text;
+  byId("banner-spinner").hidden = !tries;
 }
 
 picture.onDrawn = (message) => {
@@ -175,6 +194,13 @@ function showHud() {
   hud.show(status, [canvas.width, canvas.height], measured);
 }
 
+/** Where the sampler does not know what was asked for, the picture is shown, and it is said why. */
+function showNoOverlay() {
+  const is = state !== null && status.overlay === "unknown";
+  const wanted = is && panel.overlayTitle(state.settings.overlay);
+  hud.showNoOverlay(is ? `sampler ${state.settings.sampler} has no ${wanted}; adaptive has. This is the picture` : null);
+}
+
 function showDriver() {
   const mine = drives();
   byId("driver").classList.toggle("mine", mine);
@@ -202,9 +228,12 @@ function showLoading(what) {
 // ---- what the user does ----
 
 async function savePng() {
-  const png = await picture.png();
-  if (png) messages.info(`saved ${download(png, scene?.name ?? "picture", "png")}`);
-  else messages.error("the browser could not make a PNG of the picture");
+  try {
+    const name = download(await exactPng(), scene?.name ?? "picture", "png");
+    messages.info(`saved ${name}`);
+  } catch (error) {
+    messages.error(`no picture was saved: ${error.message}`);
+  }
 }
 
 function togglePanels() {
@@ -243,34 +272,58 @@ on("picture", "dblclick", (event) => comeBack(event.timeStamp));
 theme.begin(byId("theme"));
 
 const KEYS = {
-  Space: () => transport.toggle(),
+  Space: () => mayAsk() && transport.toggle(),
   KeyH: () => showKeys(),
   KeyP: togglePanels,
   KeyI: savePng,
   KeyR: () => recorder.toggle(),
   Home: (event) => comeBack(event.timeStamp),
-  Escape: () => messages.clear(),
+  Escape: () => {
+    messages.clear();
+    toPicture();
+  },
 };
+
+// Whoever has chosen with the mouse goes on with the picture; whoever came by the tab key stays at the control.
+let byPointer = false;
+addEventListener("pointerdown", () => (byPointer = true), true);
+addEventListener("change", ({ target }) => byPointer && target.matches("select") && toPicture());
+
+function toPicture() {
+  canvas.focus({ preventScroll: true });
+}
 
 /** Keys belong to the control that has the focus, where it knows what to do with them. */
 function isTyping({ target, code }) {
   if (byId("keys").open) return code !== "KeyH";
   const type = target.closest?.("input, select, button")?.type;
-  if (type === undefined) return false;
+  if (type === undefined || code === "Escape") return false;
   if (code === "Space") return type !== "range";
-  if (type === "range") return code === "Home";
-  return ["number", "select-one"].includes(type);
+  const isArrow = code.startsWith("Arrow");
+  if (type === "range") return isArrow || code === "Home";
+  if (type === "radio") return isArrow;
+  if (type === "select-one") return !byPointer;
+  return type === "number";
 }
 
 addEventListener("keydown", (event) => {
+  if (event.code === "Tab") byPointer = false;
   if (isTyping(event) || event.ctrlKey || event.metaKey || event.altKey) return;
-  if (hands.key(event, true)) return;
-  const digit = /^(?:Digit|Numpad)([0-6])$/.exec(event.code);
-  const action = digit ? () => panel.overlay(Number(digit[1])) : (KEYS[event.code] ?? (event.key === "?" ? showKeys : null));
-  if (!action || event.repeat) return;
+  const moves = hands.key(event, true);
+  const action = moves ? null : actionOf(event);
+  if (!moves && !action) return;
   event.preventDefault();
-  action(event);
+  // A list would take the next key for the name of one of its entries.
+  if (event.target.matches?.("select")) toPicture();
+  if (action && !event.repeat) action(event);
 });
+
+function actionOf({ code, key }) {
+  const digit = /^(?:Digit|Numpad)([0-6])$/.exec(code);
+  if (digit) return () => mayAsk() && panel.overlay(Number(digit[1]));
+  return KEYS[code] ?? (key === "?" ? showKeys : null);
+}
+
 addEventListener("keyup", (event) => hands.key(event, false));
 
 showDriver();

@@ -31,6 +31,7 @@ export class Panel {
   #state = null;
   #rate = FIRST_RATE;
   #hints = new Map();
+  #titles = new Map();
 
   /** `set(settings)` is called with those that the user has changed. */
   constructor(set) {
@@ -40,11 +41,15 @@ export class Panel {
   }
 
   /** What the server offers: names of samplers, overlays and scenes. */
-  offer({ samplers, overlays, scenes, upload_bytes: uploadBytes }) {
+  offer({ samplers, tone_maps: toneMaps, overlays, scenes, upload_bytes: uploadBytes }) {
     byId("sampler").replaceChildren(...samplers.map(({ name, description }) => {
       this.#hints.set(name, description);
       return Object.assign(option(name, name), { title: description });
     }));
+    byId("tone-map").replaceChildren(...toneMaps.map(({ name, description }) => {
+      return Object.assign(option(name, name), { title: description });
+    }));
+    for (const { name, title } of overlays) this.#titles.set(name, title ?? name);
     byId("overlays").replaceChildren(...overlays.map(overlayChoice));
     const first = option("", "pick …");
     byId("scenes").replaceChildren(first, ...scenes.map(({ name, description }) => {
@@ -71,10 +76,15 @@ export class Panel {
     else setTimeout(() => this.#state && this.show(this.#state, !byId("controls").disabled), HANDS_OFF_MS);
   }
 
+  /** What the panel calls an overlay. */
+  overlayTitle(name) {
+    return this.#titles.get(name) ?? name;
+  }
+
   /** Shows another overlay at once, and asks for it. */
   overlay(index) {
     const choice = byId("overlays").querySelectorAll("input")[index];
-    if (!choice || byId("controls").disabled) return;
+    if (!choice) return;
     choice.checked = true;
     this.#change({ overlay: choice.value });
   }
@@ -93,6 +103,7 @@ export class Panel {
     byId("rate").disabled = settings.samples_per_sec === null;
     slide("rate", Math.log10(this.#rate));
     slide("exposure", settings.exposure_stops);
+    byId("tone-map").value = settings.tone_map;
     showSize(settings.picture);
     for (const radio of document.getElementsByName("overlay")) radio.checked = radio.value === settings.overlay;
   }
@@ -130,6 +141,7 @@ export class Panel {
       byId("rate").disabled = !limited;
       this.#change({ samples_per_sec: limited ? this.#rate : null });
     });
+    on("tone-map", "change", () => this.#change({ tone_map: byId("tone-map").value }));
     on("size", "change", () => this.#change({ picture: byId("size").value }));
     for (const radio of document.getElementsByName("reconstruction"))
       radio.addEventListener("change", () => this.#reconstruct());

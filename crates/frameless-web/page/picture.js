@@ -95,9 +95,4 @@ export class Picture {
     this.#context.imageSmoothingEnabled = false;
     this.onResized();
   }
-
-  /** The picture as a PNG. */
-  png() {
-    return new Promise((done) => this.#canvas.toBlob(done, "image/png"));
-  }
 }

@@ -7,7 +7,7 @@ const STATUS = 2;
 const ACKNOWLEDGEMENT = 16;
 const TILES_HEADER = 32;
 const STATUS_SIZE = 48;
-const CODECS = { 1: "image/jpeg", 2: "image/png", 3: "image/webp" };
+const CODECS = { 1: "image/jpeg", 2: "image/png" };
 
 /** Bytes → {type: "tiles", …} or {type: "status", …}. Throws an Error that says what is wrong with them. */
 export function read(buffer) {
@@ -35,7 +35,6 @@ function readTiles(view, buffer) {
   if (outside !== undefined) throw new Error(`tile ${outside} of ${across} × ${down}`);
   return {
     type: "tiles",
-    exact: (view.getUint8(3) & 1) !== 0,
     sequence: view.getUint32(4, true),
     generation: view.getUint32(8, true),
     width,

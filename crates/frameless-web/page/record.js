@@ -36,6 +36,7 @@ export class Recorder {
     this.#clock = setInterval(() => this.#tell(), 500);
     try {
       this.#save(await film.whole());
+      if (film.endedBy) this.onNotice("warning", film.endedBy);
     } catch (error) {
       this.onNotice("error", `the recording broke off: ${error.message}`);
     } finally {
@@ -129,6 +130,8 @@ function drawInto(context, source) {
 /** Of the server's pictures, by the server's encoder; it sends the file while that grows. */
 class ServersFilm {
   #stopped = false;
+  /** Why it has ended before it was stopped. */
+  endedBy = null;
 
   stop() {
     this.#stopped = true;
@@ -139,15 +142,27 @@ class ServersFilm {
     if (!answer.ok) throw new Error((await answer.text()).trim() || `the server answers ${answer.status}`);
     const reader = answer.body.getReader();
     const parts = [];
+    try {
+      await this.#read(reader, parts);
+    } catch (error) {
+      this.endedBy = `the recording broke off, and what there was is saved: ${error.message}`;
+    }
+    await reader.cancel().catch(() => {}); // it may be broken
+    return parts;
+  }
+
+  async #read(reader, parts) {
     for (let bytes = 0; bytes < MOST_BYTES; ) {
       const { done, value } = await reader.read();
-      if (done) break; // the picture has another size now
+      if (done) {
+        this.endedBy = "the recording has ended: the picture has another size now";
+        return;
+      }
       parts.push(value);
       bytes += value.byteLength;
       // What came after the end was asked for is the piece with the end in it.
-      if (this.#stopped) break;
+      if (this.#stopped) return;
     }
-    await reader.cancel();
-    return parts;
+    this.endedBy = "the recording has ended: it is as long as a page can keep";
   }
 }

@@ -28,7 +28,6 @@ export class Transport {
   }
 
   toggle() {
-    if (byId("play").disabled) return;
     this.#send({ type: "play", on: !this.#playing });
   }
 

@@ -5,8 +5,8 @@ const byId = (id) => document.getElementById(id);
 export class Upload {
   #messages;
   #request = null;
-  /** What the server allows: bytes, and this client's number. */
-  limit = { bytes: 0, client: 0 };
+  /** What the server allows: bytes, and the token by which it knows this page. */
+  limit = { bytes: 0, token: "" };
   /** Whether this page may. */
   allowed = () => false;
 
@@ -29,9 +29,10 @@ export class Upload {
       return;
     }
     const url = new URL("upload", location.href);
-    url.search = new URLSearchParams({ client: this.limit.client, name: file.name });
+    url.search = new URLSearchParams({ name: file.name });
     const request = new XMLHttpRequest(); // fetch tells no progress of what is sent
     request.open("POST", url);
+    request.setRequestHeader("X-Client", this.limit.token);
     request.upload.onprogress = ({ loaded, total }) => this.#progress(loaded / (total || 1));
     request.onload = () => this.#ended(request.status === 200 ? "info" : "error", request.responseText.trim());
     request.onerror = () => this.#ended("error", `${file.name} did not arrive: the connection was lost`);

@@ -11,7 +11,8 @@ use axum::extract::ws::{CloseFrame, Message, WebSocket, close_code};
 use tokio::task::JoinHandle;
 use tokio::time::{MissedTickBehavior, interval, sleep_until, timeout};
 
-use crate::hub::{Event, HubHandle};
+use crate::Secret;
+use crate::hub::{Event, HubHandle, Joining};
 use crate::mailbox::Mailbox;
 use crate::tiles::{Flow, Published};
 use crate::wire::{Ack, LONGEST_MESSAGE, Said, StatusMessage, WireError};
@@ -37,14 +38,30 @@ enum End {
     Stalled,
 }
 
+/// A client that has been let in.
+pub(crate) struct Newcomer {
+    /// By which others know it.
+    pub(crate) number: u32,
+    /// By which it is recognised, see [`Joining`].
+    pub(crate) token: Secret,
+    /// The token of the connection that it had before.
+    pub(crate) resumes: Option<String>,
+}
+
 /// Runs until the client goes, does what it must not, or stalls.
-pub(crate) async fn serve(client: u32, socket: WebSocket, hub: HubHandle, stalled: Duration) {
+pub(crate) async fn serve(
+    newcomer: Newcomer,
+    socket: WebSocket,
+    hub: HubHandle,
+    stalled: Duration,
+) {
+    let Newcomer { number: client, token, resumes } = newcomer;
     let mailbox = Arc::new(Mailbox::default());
-    let join = Event::Join { client, mailbox: Arc::clone(&mailbox) };
-    if hub.events.send(join).await.is_err() {
+    let joining = Joining { client, token, resumes, mailbox: Arc::clone(&mailbox) };
+    let events = hub.events.clone();
+    if events.send(Event::Join(joining)).await.is_err() {
         return;
     }
-    let events = hub.events.clone();
     let mut connection = Connection::new(client, socket, mailbox, hub, stalled);
     let end = connection.run().await;
     // Fails if the hub has ended.
@@ -68,6 +85,8 @@ struct Connection {
     // The canvas is this picture, once all that was sent is drawn.
     exact: Option<Arc<Published>>,
     heard_at: Instant,
+    // Bytes of what moves in the newest picture of which something was sent.
+    moved: (u32, usize),
     sent_bytes: u64,
     status: StatusMeter,
 }
@@ -111,6 +130,7 @@ impl Connection {
             look_at: None,
             exact: None,
             heard_at: now,
+            moved: (0, 0),
             sent_bytes: 0,
             status,
         }
@@ -184,13 +204,16 @@ impl Connection {
         self.outgoing = Some(outgoing);
         let now = Instant::now();
         self.look_at = wait.map(|wait| now + wait);
+        let number = picture.number;
         self.exact = all_exact.then_some(picture);
         if let Some(message) = message {
             // What else is there to send is seen when it has been sent.
             self.look = true;
             self.flow.send(message.len(), now);
             if moves {
-                self.hub.moved(message.len());
+                let before = if self.moved.0 == number { self.moved.1 } else { 0 };
+                self.moved = (number, before + message.len());
+                self.hub.moved(self.moved.1);
             }
             self.send(Message::binary(message)).await?;
         }

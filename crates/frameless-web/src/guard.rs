@@ -5,7 +5,10 @@
 //!   every WebSocket and every `POST`. A page of another site has another.
 //! - The secret must come along, in the cookie; or in the address of `/`, which is answered with the cookie.
 
-use axum::http::header::{COOKIE, HOST, ORIGIN};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use axum::http::header::{COOKIE, HOST, HeaderValue, ORIGIN};
 use axum::http::{HeaderMap, Method, Uri};
 
 use crate::Secret;
@@ -94,6 +97,45 @@ impl Guard {
     }
 }
 
+/// Who is turned away, for whoever looks after the server. One line in ten seconds: a log is not to be filled from outside.
+#[derive(Debug, Default)]
+pub(crate) struct Refusals {
+    // When one was written last, and how many have not been since.
+    written: Mutex<(Option<Instant>, u64)>,
+}
+
+const BETWEEN_LINES: Duration = Duration::from_secs(10);
+/// Of what a stranger wrote.
+const LONGEST_HOST: usize = 60;
+
+impl Refusals {
+    /// Writes a warning, or counts it for the next one.
+    pub(crate) fn log(&self, refusal: Refusal, method: &Method, host: Option<&HeaderValue>) {
+        let Some(unsaid) = self.turn(Instant::now()) else { return };
+        let why = match refusal {
+            Refusal::Host => "its Host is none of this server's names",
+            Refusal::Origin => "its Origin is not this server's, or missing",
+            Refusal::Secret => "it has not got the secret",
+        };
+        let bytes = host.map(HeaderValue::as_bytes).unwrap_or_default();
+        let host = String::from_utf8_lossy(&bytes[..bytes.len().min(LONGEST_HOST)]);
+        let more = if unsaid > 0 { format!("; {unsaid} more since then") } else { String::new() };
+        log::warn!("a {method} request for host {host:?} was turned away: {why}{more}");
+    }
+
+    /// How many were not written since the last one that was, if it is time for another.
+    fn turn(&self, now: Instant) -> Option<u64> {
+        let mut written = self.written.lock().unwrap_or_else(PoisonError::into_inner);
+        let (last, unsaid) = &mut *written;
+        if last.is_some_and(|last| now.duration_since(last) < BETWEEN_LINES) {
+            *unsaid += 1;
+            return None;
+        }
+        *last = Some(now);
+        Some(std::mem::take(unsaid))
+    }
+}
+
 /// The header's value if it comes once; an error if it comes twice or is not text.
 fn only(headers: &HeaderMap, name: axum::http::HeaderName) -> Result<Option<&str>, Refusal> {
     let wrong = if name == HOST { Refusal::Host } else { Refusal::Origin };
@@ -134,6 +176,15 @@ mod tests {
             names: ["127.0.0.1", "localhost", "[::1]"].map(str::to_owned).to_vec(),
             tls: false,
         }
+    }
+
+    #[test]
+    fn a_flood_of_refusals_is_a_line_in_ten_seconds() {
+        let (refusals, now) = (Refusals::default(), Instant::now());
+        assert_eq!(refusals.turn(now), Some(0));
+        assert!((0..500).all(|_| refusals.turn(now).is_none()));
+        assert_eq!(refusals.turn(now + BETWEEN_LINES), Some(500));
+        assert_eq!(refusals.turn(now + 2 * BETWEEN_LINES), Some(0));
     }
 
     #[test]

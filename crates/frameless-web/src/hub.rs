@@ -20,10 +20,11 @@ use frameless_session::{
 };
 use tokio::sync::{mpsc, watch};
 
-pub(crate) use events::{Event, HubHandle, LoopStatus, Upload, UploadRefused};
+pub(crate) use events::{Event, HubHandle, Joining, Looking, LoopStatus, Upload, UploadRefused};
 use inputs::Inputs;
 use opening::Opening;
 
+use crate::Secret;
 use crate::legend;
 use crate::mailbox::Kind;
 use crate::roster::Roster;
@@ -78,6 +79,10 @@ pub(crate) struct Hub<W: Send + 'static> {
     // Memory for the next picture; none while one is being made.
     memory: Option<Vec<[u8; 4]>>,
     acted_at: Instant,
+    // When somebody looked last.
+    looked_at: Instant,
+    rests_after: Duration,
+    rests: bool,
     // Between two pictures that nobody waits for.
     unhurried: Duration,
     pictures: watch::Sender<Option<Arc<Published>>>,
@@ -87,9 +92,11 @@ pub(crate) struct Hub<W: Send + 'static> {
     handle: HubHandle,
 }
 
-/// Starts the loop and the hub's thread, which ends with [`Event::Stop`] or with the loop.
+/// Starts the loop and the hub's thread, which ends with [`Event::Stop`] or with the loop. Where nobody looks for `rests_after`, nothing
+/// is traced until somebody does.
 pub(crate) fn start<S>(
     show: Show<S>,
+    rests_after: Duration,
     runtime: tokio::runtime::Handle,
 ) -> anyhow::Result<(HubHandle, std::thread::JoinHandle<anyhow::Result<()>>)>
 where
@@ -104,6 +111,7 @@ where
         statuses: status,
         painted: Arc::default(),
         moved_bytes: Arc::default(),
+        lookers: Arc::default(),
     };
     let Show { session, helm, scenes } = show;
     let (settings, size) = (*session.settings(), session.size());
@@ -127,6 +135,9 @@ where
         overlay: None,
         memory: Some(Vec::new()),
         acted_at: Instant::now(),
+        looked_at: Instant::now(),
+        rests_after,
+        rests: false,
         unhurried: Duration::ZERO,
         pictures,
         statuses,
@@ -155,7 +166,7 @@ impl<W: Send + 'static> Hub<W> {
         runtime: &tokio::runtime::Handle,
     ) -> anyhow::Result<()> {
         let ended = loop {
-            let wait = self.wants_picture_in();
+            let wait = self.has_to_do_in();
             let next = runtime.block_on(async {
                 match wait {
                     None => inbox.recv().await,
@@ -174,6 +185,7 @@ impl<W: Send + 'static> Hub<W> {
                 break Err(error);
             }
             self.hear_opening();
+            self.rest();
             self.tell_loop();
             self.tell_state();
         };
@@ -186,25 +198,39 @@ impl<W: Send + 'static> Hub<W> {
         match event {
             Event::Woken => {}
             Event::Stop => return false,
-            Event::Join { client, mailbox } => {
-                mailbox.put(Kind::Welcome, self.welcome(client).to_json().into());
-                mailbox.put(Kind::Scene, self.scene().to_json().into());
-                let legend = legend::told(self.overlay.as_ref());
-                mailbox.put(Kind::Legend, legend.to_json().into());
-                mailbox.put(Kind::State, self.state().to_json().into());
-                self.roster.join(client, mailbox);
-                self.act();
-            }
-            Event::Leave(client) => {
-                self.roster.leave(client);
-                self.places.remove(&client);
-                self.refused.remove(&client);
-                self.inputs.forget(client);
-            }
+            Event::Join(joining) => self.join(joining),
+            Event::Leave(client) => self.leave(client),
             Event::Said(client, said) => self.hear(client, said),
+            Event::MayUpload { token, answer } => {
+                let uploader = self.uploader(&token);
+                // Fails if the client has gone.
+                answer.send(uploader).ok();
+            }
             Event::Upload(upload) => self.upload(upload),
         }
         true
+    }
+
+    fn join(&mut self, joining: Joining) {
+        let Joining { client, token, resumes, mailbox } = joining;
+        mailbox.put(Kind::Welcome, self.welcome(client, &token).to_json().into());
+        mailbox.put(Kind::Scene, self.scene().to_json().into());
+        mailbox.put(Kind::Legend, legend::told(self.overlay.as_ref()).to_json().into());
+        self.roster.join(client, token, Arc::clone(&mailbox));
+        let lost = resumes.and_then(|token| self.roster.with_token(&token));
+        if let Some(lost) = lost.filter(|lost| *lost != client) {
+            self.roster.succeed(lost, client);
+            self.leave(lost);
+        }
+        mailbox.put(Kind::State, self.state().to_json().into());
+        self.act();
+    }
+
+    fn leave(&mut self, client: u32) {
+        self.roster.leave(client);
+        self.places.remove(&client);
+        self.refused.remove(&client);
+        self.inputs.forget(client);
     }
 
     /// Somebody does something: the next picture is wanted at once.
@@ -297,11 +323,11 @@ impl<W: Send + 'static> Hub<W> {
 
     /// The picture is as large as the driver's page has room for.
     fn follow_place(&mut self) {
-        let place = self.roster.driver().and_then(|driver| self.places.get(&driver));
-        // A fixed size needs no place.
-        let place = place
-            .copied()
-            .or(matches!(self.settings.picture, PictureSize::Fixed(_)).then_some([0; 2]));
+        let place = match self.settings.picture {
+            // Needs none.
+            PictureSize::Fixed(_) => Some([0; 2]),
+            _ => self.roster.driver().and_then(|driver| self.places.get(&driver)).copied(),
+        };
         let Some(place) = place else { return };
         let size = settings::size_in(&self.settings, place);
         if size != self.size {
@@ -330,17 +356,45 @@ impl<W: Send + 'static> Hub<W> {
         }
     }
 
+    /// None: nothing before something happens.
+    fn has_to_do_in(&self) -> Option<Duration> {
+        match self.is_looked_at() {
+            true => self.wants_picture_in(),
+            false if self.rests => None,
+            false => Some(self.rests_after.saturating_sub(self.looked_at.elapsed())),
+        }
+    }
+
+    fn is_looked_at(&self) -> bool {
+        !self.roster.is_empty() || self.handle.lookers.load(Ordering::Relaxed) > 0
+    }
+
+    /// Stops the loop once nobody has looked for a while, and starts it as soon as somebody does.
+    fn rest(&mut self) {
+        if self.is_looked_at() {
+            self.looked_at = Instant::now();
+        }
+        let rests = self.looked_at.elapsed() >= self.rests_after;
+        if rests != self.rests {
+            self.rests = rests;
+            self.render.send(Command::Rest(rests));
+        }
+    }
+
     /// None: not before something happens.
     fn wants_picture_in(&self) -> Option<Duration> {
-        if self.memory.is_none() || self.roster.is_empty() {
+        if self.memory.is_none() || !self.is_looked_at() {
             return None;
         }
         let now = Instant::now();
         let idle = now.duration_since(self.acted_at);
-        let pause = match self.publisher.quiet_for(now) >= CALM_AFTER {
-            _ if idle < HURRIED_FOR => Duration::ZERO,
-            true if idle >= CALM_AFTER => CALM_INTERVAL,
-            _ => self.unhurried,
+        let is_calm = idle >= CALM_AFTER && self.publisher.quiet_for(now) >= CALM_AFTER;
+        let pause = if idle < HURRIED_FOR {
+            Duration::ZERO
+        } else if is_calm {
+            CALM_INTERVAL
+        } else {
+            self.unhurried
         };
         Some((self.publisher.taken_at() + pause).saturating_duration_since(now))
     }
@@ -394,9 +448,9 @@ impl<W: Send + 'static> Hub<W> {
         }
     }
 
-    fn welcome(&self, client: u32) -> Told {
+    fn welcome(&self, client: u32, token: &Secret) -> Told {
         let upload_bytes = self.scenes.as_ref().map(|scenes| scenes.limits.file_bytes);
-        legend::welcome(client, upload_bytes, self.settings.own_sampler.is_some())
+        legend::welcome(client, token, upload_bytes, self.settings.own_sampler.is_some())
     }
 
     fn scene(&self) -> Told {

@@ -3,25 +3,32 @@
 use frameless_scene::{BUILTIN_DESCRIPTIONS, BUILTIN_NAMES};
 use frameless_session::{Colours, Drawn, heatmap};
 
-use crate::settings::{self, MOST_PIXELS};
+use crate::Secret;
+use crate::settings;
 use crate::wire::{Choice, NamedColour, Told, VERSION};
 
 /// Colours of the bar: between them the page interpolates, which no eye can tell from the map itself.
 const COLOURS: usize = 36;
 
 /// First and once. `upload_bytes` is none where the renderer takes no scenes.
-pub(crate) fn welcome(client: u32, upload_bytes: Option<u64>, has_own_sampler: bool) -> Told {
+pub(crate) fn welcome(
+    client: u32,
+    token: &Secret,
+    upload_bytes: Option<u64>,
+    has_own_sampler: bool,
+) -> Told {
     let scenes = BUILTIN_NAMES.into_iter().zip(BUILTIN_DESCRIPTIONS);
     let choice = |(name, description)| Choice { name, title: None, description };
     Told::Welcome {
         version: VERSION,
         program: concat!("frameless ", env!("CARGO_PKG_VERSION")),
         client,
+        token: token.as_str().to_owned(),
         upload_bytes: upload_bytes.unwrap_or(0),
         scenes: if upload_bytes.is_some() { scenes.map(choice).collect() } else { Vec::new() },
         samplers: settings::samplers(has_own_sampler),
+        tone_maps: settings::tone_maps(),
         overlays: settings::overlays(),
-        most_pixels: MOST_PIXELS,
     }
 }
 

@@ -6,6 +6,8 @@
 //! The bytes are specified in docs/stream-format.md (`wire`). Who is let in: `guard`, and SECURITY.md.
 
 mod client;
+mod door;
+mod downloads;
 mod guard;
 mod hub;
 mod legend;
@@ -20,6 +22,7 @@ mod server;
 mod settings;
 mod show;
 mod tiles;
+mod upload;
 pub mod wire;
 
 pub use options::{DEFAULT_PORT, DEFAULT_UPLOAD_BYTES, Options, TlsFiles};

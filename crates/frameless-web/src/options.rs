@@ -1,6 +1,6 @@
 //! Where the server listens, and what it allows.
 
-use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -32,6 +32,8 @@ pub struct Options {
     pub clients: usize,
     /// A client that takes nothing, or is not heard of, for so long is dropped.
     pub stalled: Duration,
+    /// Where nobody has looked for so long nothing is traced until somebody does.
+    pub rests_after: Duration,
 }
 
 /// PEM files.
@@ -56,6 +58,7 @@ impl Default for Options {
             upload_bytes: DEFAULT_UPLOAD_BYTES,
             clients: 64,
             stalled: Duration::from_secs(30),
+            rests_after: Duration::from_secs(10),
         }
     }
 }
@@ -69,9 +72,9 @@ impl Options {
         let ip = self.address.ip();
         if !ip.is_loopback() && self.tls.is_none() && !self.insecure {
             bail!(
-                "{ip}: everybody on the way could read along and steer; give --tls-cert and --tls-key, or go through \
-                 `ssh -L {port}:localhost:{port}` to the default address, or say --insecure",
-                port = self.address.port()
+                "{ip}: everybody on the way could read along and steer; give --tls-cert and --tls-key, or leave --bind \
+                 out and go through {tunnel}, or say --insecure",
+                tunnel = self.tunnel()
             );
         }
         if ip.is_unspecified() && self.hosts.is_empty() {
@@ -79,30 +82,23 @@ impl Options {
                 "{ip} is no address that a browser can open: say with --host under which name or address this machine is reached"
             );
         }
-        for host in &self.hosts {
-            let is_name = !host.is_empty()
-                && host
-                    .bytes()
-                    .all(|byte| byte.is_ascii_alphanumeric() || b"-._[:]".contains(&byte));
-            if !is_name || host.contains(':') != host.starts_with('[') {
-                bail!(
-                    "--host {host}: wanted a name or an address without a port, such as render.example.org or [2001:db8::1]"
-                );
-            }
+        if let Some(host) = self.hosts.iter().find(|host| !is_host(host)) {
+            bail!(
+                "--host {host}: wanted a name or an address without a port, such as render.example.org or [2001:db8::1]"
+            );
         }
-        if let Some(origin) = &self.allow_frame {
-            let rest = origin.strip_prefix("http://").or(origin.strip_prefix("https://"));
-            let is_origin = rest.is_some_and(|host| {
-                !host.is_empty()
-                    && host
-                        .bytes()
-                        .all(|byte| byte.is_ascii_alphanumeric() || b"-.[:]*".contains(&byte))
-            });
-            if !is_origin {
-                bail!("--allow-frame {origin}: wanted an origin such as http://localhost:8888");
-            }
+        if let Some(origin) = self.allow_frame.as_ref().filter(|origin| !is_origin(origin)) {
+            bail!("--allow-frame {origin}: wanted one origin such as http://localhost:8888");
         }
         Ok(())
+    }
+
+    /// The command that leads here from another machine. Which port is free is known only when it has been taken.
+    fn tunnel(&self) -> String {
+        match self.address.port() {
+            0 => "`ssh -L PORT:localhost:PORT` with the port that is printed then".to_owned(),
+            port => format!("`ssh -L {port}:localhost:{port}`"),
+        }
     }
 
     /// The names under which it is reached, in lower case, the one for its URL first.
@@ -117,6 +113,26 @@ impl Options {
             names.extend(["127.0.0.1", "localhost", "[::1]"].map(str::to_owned));
         }
         names
+    }
+}
+
+/// A name, or an address as it stands in a URL; no port.
+fn is_host(host: &str) -> bool {
+    if let Some(rest) = host.strip_prefix('[') {
+        return rest.strip_suffix(']').is_some_and(|ip| ip.parse::<Ipv6Addr>().is_ok());
+    }
+    let is_letter = |byte: u8| byte.is_ascii_alphanumeric() || b"-._".contains(&byte);
+    !host.is_empty() && host.bytes().all(is_letter)
+}
+
+/// Scheme and host, with or without a port. Nothing stands for several: a star would allow every site.
+fn is_origin(origin: &str) -> bool {
+    let rest = origin.strip_prefix("http://").or(origin.strip_prefix("https://"));
+    let Some(rest) = rest else { return false };
+    // An address of version 6 has colons of its own, in brackets.
+    match rest.rsplit_once(':').filter(|(_, port)| !port.ends_with(']')) {
+        Some((host, port)) => is_host(host) && port.parse::<u16>().is_ok_and(|port| port > 0),
+        None => is_host(rest),
     }
 }
 
@@ -176,13 +192,22 @@ mod tests {
     }
 
     #[test]
+    fn the_way_through_ssh_names_no_port_that_is_none() {
+        let error = |address| at(address).check().unwrap_err().to_string();
+        assert!(error("0.0.0.0:8420").contains("ssh -L 8420:localhost:8420"));
+        assert!(!error("0.0.0.0:0").contains("0:localhost"), "{}", error("0.0.0.0:0"));
+    }
+
+    #[test]
     fn every_address_needs_a_name() {
         let anywhere = Options { insecure: true, ..at("0.0.0.0:1") };
         assert!(anywhere.check().unwrap_err().to_string().contains("--host"));
         let named = Options { hosts: vec!["Render.example".to_owned()], ..anywhere };
         named.check().unwrap();
         assert_eq!(named.names()[0], "render.example");
-        for bad in ["", "a b", "http://a", "a:80", "a/b"] {
+        for bad in
+            ["", "a b", "http://a", "a:80", "a/b", "[::1", "[::1]:80", "::1", "[]", "[a]", "a]"]
+        {
             assert!(
                 Options { hosts: vec![bad.to_owned()], ..at("127.0.0.1:1") }.check().is_err(),
                 "{bad}"
@@ -194,11 +219,20 @@ mod tests {
     fn a_frames_origin_cannot_smuggle_a_policy_in() {
         let allowing =
             |origin: &str| Options { allow_frame: Some(origin.to_owned()), ..Options::default() };
-        allowing("http://localhost:8888").check().unwrap();
+        for good in ["http://localhost:8888", "https://a.example", "http://[::1]:1", "http://[::1]"]
+        {
+            allowing(good).check().unwrap();
+        }
         for bad in [
             "*",
             "localhost",
             "http://",
+            "http://*",
+            "https://*.example",
+            "http://a:",
+            "http://a:0",
+            "http://a:1:2",
+            "http://[::1",
             "http://a; script-src *",
             "http://a\r\nX: y",
             "http://a b",

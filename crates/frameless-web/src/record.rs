@@ -2,9 +2,10 @@
 //! nothing of it is kept here. It ends when the client has heard enough, or when the picture takes another size.
 
 use std::sync::Arc;
+use std::task::{Context, Poll};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
+use anyhow::{Context as _, Result, bail};
 use axum::body::Bytes;
 use frameless::Size;
 use muxide::fragmented::{FragmentConfig, FragmentedMuxer};
@@ -14,7 +15,7 @@ use openh264::encoder::{
     RateControlMode, UsageType, VuiConfig,
 };
 use openh264::formats::{RgbSliceU8, YUVBuffer};
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, watch};
 
 use crate::tiles::Published;
 
@@ -32,42 +33,108 @@ const BITS_PER_SEC: u32 = 60_000_000;
 const SMALLEST_SIDE: u32 = 16;
 // Of the file's clock, per second: the usual one for video.
 const TICKS_PER_SEC: u32 = 90_000;
+// A fragment ends early where it has so many bytes.
+const LARGEST_FRAGMENT: usize = 4 << 20;
 // A client that takes nothing for so many fragments, twenty seconds, has gone.
 const FRAGMENTS_WAITING: usize = 60;
+// The same in bytes, whatever is recorded: four times the largest fragment, which is more than any second of a real picture takes.
+const BYTES_WAITING: u32 = 4 * LARGEST_FRAGMENT as u32;
+// The first picture is there as soon as the loop has begun.
+const PICTURE_WITHIN: Duration = Duration::from_secs(10);
 
 type Pictures = watch::Receiver<Option<Arc<Published>>>;
 
-/// Begins a recording in a thread of its own: what is received is an MP4 file, piece by piece. The thread ends when the receiver is
-/// dropped, does not take what comes, or the picture takes another size.
+/// An MP4 file while it is made.
+pub(crate) struct Recording {
+    pieces: mpsc::Receiver<std::io::Result<Piece>>,
+}
+
+/// A part of the file that waits to be taken.
+struct Piece {
+    bytes: Bytes,
+    // Of [`BYTES_WAITING`].
+    _room: OwnedSemaphorePermit,
+}
+
+impl Recording {
+    /// The next piece; an error, once and last, if the recording has failed or too little of it is taken.
+    pub(crate) fn poll_piece(
+        &mut self,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<std::io::Result<Bytes>>> {
+        let taken = self.pieces.poll_recv(context);
+        taken.map(|piece| piece.map(|piece| piece.map(|piece| piece.bytes)))
+    }
+}
+
+/// Begins a recording in a thread of its own, which ends when the recording is dropped, when too little of it is taken, or when the
+/// picture takes another size.
 ///
 /// # Errors
 /// If there is no thread.
-pub(crate) fn begin(pictures: Pictures) -> std::io::Result<mpsc::Receiver<Bytes>> {
-    let (pieces, taken) = mpsc::channel(FRAGMENTS_WAITING);
+pub(crate) fn begin(pictures: Pictures) -> std::io::Result<Recording> {
+    let (outlet, recording) = Outlet::new();
     std::thread::Builder::new().name("recording".to_owned()).spawn(move || {
-        if let Err(error) = record(&pictures, &pieces) {
+        if let Err(error) = record(&pictures, &outlet) {
             log::warn!("the recording broke off: {error:#}");
+            // Fails if nobody waits for it any longer.
+            outlet.pieces.blocking_send(Err(std::io::Error::other(error))).ok();
         }
     })?;
-    Ok(taken)
+    Ok(recording)
 }
 
-fn record(pictures: &Pictures, pieces: &mpsc::Sender<Bytes>) -> Result<()> {
+/// Where a recording goes to. Never waits.
+struct Outlet {
+    pieces: mpsc::Sender<std::io::Result<Piece>>,
+    room: Arc<Semaphore>,
+}
+
+impl Outlet {
+    fn new() -> (Outlet, Recording) {
+        let (sender, pieces) = mpsc::channel(FRAGMENTS_WAITING);
+        let room = Arc::new(Semaphore::new(BYTES_WAITING as usize));
+        (Outlet { pieces: sender, room }, Recording { pieces })
+    }
+
+    /// Hands a piece over; an error if too much waits already.
+    fn send(&self, piece: Vec<u8>) -> Result<()> {
+        const TOO_SLOW: &str = "what has been recorded is taken too slowly";
+        // One that is larger than all room has it all.
+        let wanted = u32::try_from(piece.len()).unwrap_or(BYTES_WAITING).min(BYTES_WAITING);
+        let room = Arc::clone(&self.room).try_acquire_many_owned(wanted).context(TOO_SLOW)?;
+        match self.pieces.try_send(Ok(Piece { bytes: piece.into(), _room: room })) {
+            Err(mpsc::error::TrySendError::Full(_)) => bail!(TOO_SLOW),
+            // Nobody listens: seen by whoever asks `has_ended`.
+            Err(mpsc::error::TrySendError::Closed(_)) | Ok(()) => Ok(()),
+        }
+    }
+
+    fn has_ended(&self) -> bool {
+        self.pieces.is_closed()
+    }
+}
+
+fn record(pictures: &Pictures, outlet: &Outlet) -> Result<()> {
     let newest = || pictures.borrow().clone();
+    let asked = Instant::now();
+    while newest().is_none() && asked.elapsed() < PICTURE_WITHIN && !outlet.has_ended() {
+        std::thread::sleep(Duration::from_secs(1) / FRAMES_PER_SEC);
+    }
     let begun = Instant::now();
     let first = newest().context("there is no picture yet")?;
     let (generation, mut film) = (first.generation, Film::new(first.size)?);
     while let Some(picture) = newest().filter(|picture| picture.generation == generation) {
         let piece = film.push(&picture)?;
-        if !piece.is_empty() && pieces.try_send(piece.into()).is_err() {
-            break;
+        if !piece.is_empty() {
+            outlet.send(piece)?;
         }
         // Frames that there was no time for are left out: the next one stands in their place for as long.
         let elapsed = begun.elapsed().as_secs_f64() * f64::from(FRAMES_PER_SEC);
         film.frame = (elapsed as u32).max(film.frame + 1);
         let due = begun + Duration::from_secs(1) * film.frame / FRAMES_PER_SEC;
         std::thread::sleep(due.saturating_duration_since(Instant::now()));
-        if pieces.is_closed() {
+        if outlet.has_ended() {
             break;
         }
     }
@@ -83,7 +150,9 @@ struct Film {
     frame: u32,
     // None before the first frame: the file's head has the encoder's parameters in it.
     muxer: Option<FragmentedMuxer>,
-    in_fragment: u32,
+    // Of the fragment that grows.
+    frames: u32,
+    bytes: usize,
 }
 
 impl Film {
@@ -102,7 +171,7 @@ impl Film {
             .vui(VuiConfig::bt601());
         let encoder = Encoder::with_api_config(OpenH264API::from_source(), config)?;
         let (width, height) = (even(size.width), even(size.height));
-        Ok(Film { encoder, width, height, frame: 0, muxer: None, in_fragment: 0 })
+        Ok(Film { encoder, width, height, frame: 0, muxer: None, frames: 0, bytes: 0 })
     }
 
     /// Appends a frame. What the file grows by may be nothing yet.
@@ -123,9 +192,10 @@ impl Film {
         };
         let at = u64::from(self.frame) * u64::from(TICKS_PER_SEC / FRAMES_PER_SEC);
         muxer.write_video(at, at, &with_lengths(&stream), is_key)?;
-        self.in_fragment += 1;
-        if self.in_fragment == FRAGMENT_FRAMES {
-            self.in_fragment = 0;
+        self.frames += 1;
+        self.bytes += stream.len();
+        if self.frames == FRAGMENT_FRAMES || self.bytes >= LARGEST_FRAGMENT {
+            (self.frames, self.bytes) = (0, 0);
             piece.extend(muxer.flush_segment().unwrap_or_default());
         }
         Ok(piece)
@@ -256,14 +326,51 @@ mod tests {
     }
 
     #[test]
+    fn what_waits_is_bounded_by_its_bytes_and_too_much_is_an_error() {
+        let (outlet, mut recording) = Outlet::new();
+        let third = || vec![0; BYTES_WAITING as usize / 3];
+        for _ in 0..3 {
+            outlet.send(third()).expect("there is room");
+        }
+        assert!(outlet.send(third()).unwrap_err().to_string().contains("too slowly"));
+        drop(recording.pieces.try_recv().expect("a piece"));
+        outlet.send(third()).expect("one was taken");
+        while recording.pieces.try_recv().is_ok() {}
+        outlet.send(vec![0; 2 * BYTES_WAITING as usize]).expect("it is alone");
+        assert!(outlet.send(vec![0]).is_err());
+        drop(recording);
+        assert!(outlet.has_ended());
+    }
+
+    #[test]
+    fn noise_makes_short_fragments() {
+        let size = Size::new(1920, 1080);
+        let mut rng = frameless::Rng::new(1);
+        let mut film = Film::new(size).expect("it begins");
+        let mut picture = Arc::into_inner(published(size, 0)).expect("ours alone");
+        let mut largest = 0;
+        for frame in 0..4 {
+            for pixel in &mut picture.rgba {
+                *pixel = [0; 4].map(|_| (256.0 * rng.unit_f32()) as u8);
+            }
+            film.frame = frame;
+            largest = largest.max(film.push(&picture).expect("it is encoded").len());
+        }
+        assert!((1..BYTES_WAITING as usize).contains(&largest), "{largest} bytes");
+    }
+
+    #[test]
     fn another_size_ends_a_recording_and_so_does_nobody_listening() {
         let (show, pictures) = watch::channel(Some(published(SIZE, 9)));
-        let mut pieces = begin(pictures.clone()).expect("a thread");
-        assert!(pieces.blocking_recv().is_some_and(|head| &head[4..8] == b"ftyp"));
+        let mut recording = begin(pictures.clone()).expect("a thread");
+        let head = recording.pieces.blocking_recv().expect("a piece").expect("no error");
+        assert_eq!(&head.bytes[4..8], b"ftyp");
         let mut other = Arc::into_inner(published(Size::new(32, 32), 9)).expect("ours alone");
         other.generation = 2;
         show.send_replace(Some(Arc::new(other)));
-        while pieces.blocking_recv().is_some() {}
+        while let Some(piece) = recording.pieces.blocking_recv() {
+            assert!(piece.is_ok(), "another size is no error");
+        }
         let listening = begin(pictures.clone()).expect("a thread");
         drop(listening);
         let begun = Instant::now();

@@ -1,44 +1,45 @@
 //! What there is to ask for, behind the guard.
 
-use std::pin::Pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::task::{Context, Poll};
 use std::time::Duration;
 
 use axum::Router;
-use axum::body::{Body, Bytes};
 use axum::extract::ws::WebSocketUpgrade;
-use axum::extract::{Path, Query, Request, State};
+use axum::extract::{Extension, Path, Query, Request, State};
 use axum::http::header::{self, HeaderName, HeaderValue};
 use axum::http::{HeaderMap, StatusCode};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use serde::Deserialize;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot};
+use tokio::sync::Semaphore;
 
-use crate::client;
-use crate::guard::{Admission, Guard};
-use crate::hub::{Event, HubHandle, Upload, UploadRefused};
-use crate::tiles::Published;
+use crate::door::Visitor;
+use crate::guard::{Admission, Guard, Refusals};
+use crate::hub::HubHandle;
 use crate::wire::LONGEST_MESSAGE;
+use crate::{Secret, client, downloads, page, upload};
 
 /// What is too long is read so far, so that the client can be told; from more the connection breaks off.
 const LONGEST_READ: usize = 2 * LONGEST_MESSAGE;
-use crate::{page, record};
 
 /// What every request may need.
 pub(crate) struct Shared {
     pub(crate) guard: Guard,
+    pub(crate) refusals: Refusals,
     /// Who may show the page in a frame, in the words of a content-security policy.
     pub(crate) frame_ancestors: String,
     pub(crate) hub: HubHandle,
     pub(crate) upload_bytes: u64,
     /// See [`crate::Options::stalled`].
     pub(crate) stalled: Duration,
-    /// Clients that may still connect.
+    /// The most clients at once.
+    pub(crate) clients: usize,
+    /// Those that may still connect.
     pub(crate) seats: Arc<Semaphore>,
+    /// Pictures that may still be asked for: each is whole in memory until it has been taken.
+    pub(crate) pictures: Arc<Semaphore>,
     /// One upload at a time: each may be large.
     pub(crate) uploading: Arc<Semaphore>,
     /// Recordings that may still begin.
@@ -46,16 +47,17 @@ pub(crate) struct Shared {
     pub(crate) next_client: AtomicU32,
 }
 
-type App = State<Arc<Shared>>;
+pub(crate) type App = State<Arc<Shared>>;
 
 /// The routes, with the guard in front of all of them and of what is none.
 pub(crate) fn router(shared: Arc<Shared>) -> Router {
     Router::new()
         .route("/", get(async || html(page::INDEX.to_owned())))
         .route("/stream", get(stream))
-        .route("/picture.png", get(picture))
-        .route("/recording.mp4", get(recording))
-        .route("/upload", post(upload))
+        .route("/clients", get(clients))
+        .route("/picture.png", get(downloads::picture))
+        .route("/recording.mp4", get(downloads::recording))
+        .route("/upload", post(upload::upload))
         .route("/{file}", get(file))
         .fallback(async || StatusCode::NOT_FOUND)
         .layer(middleware::from_fn_with_state(Arc::clone(&shared), guarded))
@@ -63,10 +65,19 @@ pub(crate) fn router(shared: Arc<Shared>) -> Router {
 }
 
 /// The one way in.
-async fn guarded(State(shared): App, request: Request, next: Next) -> Response {
+async fn guarded(
+    State(shared): App,
+    Extension(visitor): Extension<Arc<Visitor>>,
+    request: Request,
+    next: Next,
+) -> Response {
     let guard = &shared.guard;
     let host = request.headers().get(header::HOST).cloned();
     let admission = guard.check(request.method(), request.uri(), request.headers());
+    match admission {
+        Ok(_) => visitor.is_known(),
+        Err(refusal) => shared.refusals.log(refusal, request.method(), host.as_ref()),
+    }
     let mut response = match admission {
         Ok(Admission::Enter) => next.run(request).await,
         Ok(Admission::Exchange) => exchange(guard),
@@ -134,177 +145,45 @@ async fn file(Path(name): Path<String>) -> Response {
     }
 }
 
-async fn stream(State(shared): App, upgrade: WebSocketUpgrade) -> Response {
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StreamQuery {
+    /// The token that this page had before its connection was lost.
+    resume: Option<String>,
+}
+
+async fn stream(
+    State(shared): App,
+    Query(query): Query<StreamQuery>,
+    upgrade: WebSocketUpgrade,
+) -> Response {
     let Ok(seat) = Arc::clone(&shared.seats).try_acquire_owned() else {
-        return (StatusCode::SERVICE_UNAVAILABLE, "as many clients as may be are connected\n")
-            .into_response();
+        return busy("as many clients as may be are connected\n");
     };
-    let client = shared.next_client.fetch_add(1, Ordering::Relaxed);
+    let Ok(token) = Secret::new() else {
+        return StatusCode::INTERNAL_SERVER_ERROR.into_response();
+    };
+    let number = shared.next_client.fetch_add(1, Ordering::Relaxed);
+    let newcomer = client::Newcomer { number, token, resumes: query.resume };
     let (hub, stalled) = (shared.hub.clone(), shared.stalled);
     upgrade.max_message_size(LONGEST_READ).max_frame_size(LONGEST_READ).on_upgrade(
         async move |socket| {
-            client::serve(client, socket, hub, stalled).await;
+            client::serve(newcomer, socket, hub, stalled).await;
             drop(seat);
         },
     )
 }
 
-async fn picture(State(shared): App) -> Response {
-    let newest = shared.hub.pictures.borrow().clone();
-    let Some(newest) = newest else {
-        return (StatusCode::NOT_FOUND, "there is no picture yet\n").into_response();
-    };
-    let number = newest.number;
-    match tokio::task::spawn_blocking(move || png(&newest)).await {
-        Ok(Ok(png)) => {
-            let headers = [
-                (header::CONTENT_TYPE, "image/png".to_owned()),
-                (HeaderName::from_static("x-picture"), number.to_string()),
-            ];
-            (headers, png).into_response()
-        }
-        _ => StatusCode::INTERNAL_SERVER_ERROR.into_response(),
-    }
+/// How many clients there are and may be: a browser does not tell a page why its WebSocket was refused.
+async fn clients(State(shared): App) -> Response {
+    let connected = shared.clients - shared.seats.available_permits();
+    let text = format!("{{\"clients\": {connected}, \"most\": {}}}\n", shared.clients);
+    ([(header::CONTENT_TYPE, "application/json")], text).into_response()
 }
 
-fn png(picture: &Published) -> Result<Vec<u8>, png::EncodingError> {
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, picture.size.width, picture.size.height);
-    encoder.set_color(png::ColorType::Rgba);
-    encoder.set_compression(png::Compression::Fast);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(picture.rgba.as_flattened())?;
-    writer.finish()?;
-    Ok(bytes)
-}
-
-async fn recording(State(shared): App) -> Response {
-    let Ok(turn) = Arc::clone(&shared.recording).try_acquire_owned() else {
-        let text = "as many recordings as may be are running
-";
-        return (StatusCode::SERVICE_UNAVAILABLE, text).into_response();
-    };
-    let Ok(pieces) = record::begin(shared.hub.pictures.clone()) else {
-        return StatusCode::SERVICE_UNAVAILABLE.into_response();
-    };
-    let headers = [
-        (header::CONTENT_TYPE, "video/mp4"),
-        (header::CONTENT_DISPOSITION, "attachment; filename=\"frameless.mp4\""),
-    ];
-    (headers, Body::from_stream(Pieces { pieces, _turn: turn })).into_response()
-}
-
-/// A file as it is being made.
-struct Pieces {
-    pieces: mpsc::Receiver<Bytes>,
-    _turn: OwnedSemaphorePermit,
-}
-
-impl futures_core::Stream for Pieces {
-    type Item = Result<Bytes, std::convert::Infallible>;
-
-    fn poll_next(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Self::Item>> {
-        self.pieces.poll_recv(context).map(|piece| piece.map(Ok))
-    }
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct UploadQuery {
-    client: u32,
-    #[serde(default)]
-    name: String,
-}
-
-async fn upload(
-    State(shared): App,
-    Query(query): Query<UploadQuery>,
-    headers: HeaderMap,
-    body: Body,
-) -> (StatusCode, String) {
-    let Ok(_turn) = Arc::clone(&shared.uploading).try_acquire_owned() else {
-        return (StatusCode::SERVICE_UNAVAILABLE, "another file is being uploaded\n".to_owned());
-    };
-    let announced = headers.get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok());
-    let announced = announced.and_then(|length| length.parse().ok()).unwrap_or(0);
-    let bytes = match collect(body, &shared, announced).await {
-        Ok(bytes) => bytes,
-        Err(refusal) => return refusal,
-    };
-    let (answer, answered) = oneshot::channel();
-    let upload = Upload { client: query.client, name: shown_name(&query.name), bytes, answer };
-    if shared.hub.events.send(Event::Upload(upload)).await.is_err() {
-        return (StatusCode::SERVICE_UNAVAILABLE, "the server is ending\n".to_owned());
-    }
-    match answered.await {
-        Ok(Ok(text)) => (StatusCode::OK, text),
-        Ok(Err(refused)) => explain(refused),
-        // Another scene has been asked for since.
-        Err(_) => (StatusCode::CONFLICT, "another scene was opened instead\n".to_owned()),
-    }
-}
-
-fn explain(refused: UploadRefused) -> (StatusCode, String) {
-    match refused {
-        UploadRefused::NotDriving => {
-            (StatusCode::FORBIDDEN, "another client drives; take the helm first".to_owned())
-        }
-        UploadRefused::Busy => {
-            (StatusCode::SERVICE_UNAVAILABLE, "another scene is being opened".to_owned())
-        }
-        UploadRefused::NoScenes => {
-            (StatusCode::UNPROCESSABLE_ENTITY, "this renderer has but its own scene".to_owned())
-        }
-        UploadRefused::Bad(reason) => (StatusCode::UNPROCESSABLE_ENTITY, reason),
-    }
-}
-
-/// All of a body, unless it is too long or stalls.
-async fn collect(
-    body: Body,
-    shared: &Shared,
-    announced: u64,
-) -> Result<Vec<u8>, (StatusCode, String)> {
-    let most = shared.upload_bytes;
-    let too_large = || {
-        let text = format!("the file is too large: at most {most} bytes are taken");
-        (StatusCode::PAYLOAD_TOO_LARGE, text)
-    };
-    if announced > most {
-        return Err(too_large());
-    }
-    let mut stream = body.into_data_stream();
-    let mut bytes = Vec::new();
-    while let Some(piece) = next_piece(&mut stream, shared.stalled).await? {
-        if (bytes.len() + piece.len()) as u64 > most {
-            return Err(too_large());
-        }
-        bytes.extend_from_slice(&piece);
-    }
-    Ok(bytes)
-}
-
-async fn next_piece(
-    stream: &mut axum::body::BodyDataStream,
-    stalled: Duration,
-) -> Result<Option<Bytes>, (StatusCode, String)> {
-    let next = std::future::poll_fn(|context| {
-        futures_core::Stream::poll_next(Pin::new(&mut *stream), context)
-    });
-    match tokio::time::timeout(stalled, next).await {
-        Ok(None) => Ok(None),
-        Ok(Some(Ok(piece))) => Ok(Some(piece)),
-        Ok(Some(Err(_))) => Err((StatusCode::BAD_REQUEST, "the upload broke off".to_owned())),
-        Err(_) => Err((StatusCode::REQUEST_TIMEOUT, format!("nothing came for {stalled:?}"))),
-    }
-}
-
-/// A name for messages: it opens nothing.
-fn shown_name(name: &str) -> String {
-    const LONGEST: usize = 80;
-    let printable = name.chars().filter(|c| !c.is_control()).take(LONGEST);
-    let name: String = printable.collect();
-    if name.trim().is_empty() { "the uploaded file".to_owned() } else { name }
+/// Not now, but soon.
+pub(crate) fn busy(why: &'static str) -> Response {
+    (StatusCode::SERVICE_UNAVAILABLE, [(header::RETRY_AFTER, "1")], why).into_response()
 }
 
 /// For requests whose headers do not come.

@@ -8,6 +8,9 @@ use std::time::Duration;
 use anyhow::{Context, anyhow};
 use axum::Router;
 use frameless_session::Stage;
+use hyper::Request;
+use hyper::body::Incoming;
+use hyper::service::Service;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use tokio::io::{AsyncRead, AsyncWrite};
@@ -17,7 +20,8 @@ use tokio::time::timeout;
 use tokio_io_timeout::TimeoutStream;
 use tokio_rustls::TlsAcceptor;
 
-use crate::guard::Guard;
+use crate::door::{Door, Visitor};
+use crate::guard::{Guard, Refusals};
 use crate::hub::{self, Event, HubHandle};
 use crate::routes::{self, HEADERS_WITHIN, Shared};
 use crate::{Options, Secret, Show};
@@ -46,6 +50,8 @@ impl Stopper {
 
 /// Connections beside those of clients: pages being loaded, handshakes.
 const SPARE_CONNECTIONS: usize = 64;
+/// The largest is 33 MB as it is sent.
+const MOST_PICTURES: usize = 2;
 /// Each takes a good part of a core.
 const MOST_RECORDINGS: usize = 4;
 /// What one request's headers may take, in bytes.
@@ -104,7 +110,13 @@ impl Server {
     /// If the system has no thread left, or the renderer has stopped.
     pub fn run<S: Stage + Send + 'static>(mut self, mut show: Show<S>) -> anyhow::Result<()> {
         if let Some(scenes) = &mut show.scenes {
-            scenes.limits.file_bytes = scenes.limits.file_bytes.min(self.options.upload_bytes);
+            let (wanted, most) = (self.options.upload_bytes, scenes.limits.file_bytes);
+            if wanted > most {
+                log::warn!(
+                    "uploads of {wanted} bytes were allowed, but no scene may have more than {most}: that is the limit"
+                );
+            }
+            scenes.limits.file_bytes = most.min(wanted);
         }
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(2)
@@ -115,7 +127,7 @@ impl Server {
             .build()
             .context("cannot start the web server's threads")?;
         let upload_bytes = show.scenes.as_ref().map_or(0, |scenes| scenes.limits.file_bytes);
-        let (hub, thread) = hub::start(show, runtime.handle().clone())?;
+        let (hub, thread) = hub::start(show, self.options.rests_after, runtime.handle().clone())?;
         let router = routes::router(Arc::new(self.shared(hub.clone(), upload_bytes)));
         runtime.block_on(self.listen(router, &hub));
         // The hub tells the clients, which end by themselves; if it has ended before, it is not told.
@@ -134,11 +146,14 @@ impl Server {
         };
         Shared {
             guard,
+            refusals: Refusals::default(),
             frame_ancestors: self.options.allow_frame.clone().unwrap_or("'none'".to_owned()),
             hub,
             upload_bytes,
             stalled: self.options.stalled,
+            clients: self.options.clients,
             seats: Arc::new(Semaphore::new(self.options.clients)),
+            pictures: Arc::new(Semaphore::new(MOST_PICTURES)),
             uploading: Arc::new(Semaphore::new(1)),
             recording: Arc::new(Semaphore::new(MOST_RECORDINGS)),
             next_client: AtomicU32::new(1),
@@ -150,7 +165,7 @@ impl Server {
         else {
             return;
         };
-        let connections = Arc::new(Semaphore::new(self.options.clients + SPARE_CONNECTIONS));
+        let door = Door::new(self.options.clients + SPARE_CONNECTIONS);
         loop {
             let accepted = tokio::select! {
                 accepted = listener.accept() => accepted,
@@ -162,12 +177,15 @@ impl Server {
                 tokio::time::sleep(Duration::from_millis(20)).await;
                 continue;
             };
-            // More than that: closed at once.
-            let Ok(place) = Arc::clone(&connections).try_acquire_owned() else { continue };
+            // Nobody makes room: closed at once.
+            let Some((visitor, place)) = door.enter().await else { continue };
             let (router, tls) = (router.clone(), self.tls.clone());
             let stalled = self.options.stalled;
             tokio::spawn(async move {
-                converse(stream, stalled, tls, router).await;
+                tokio::select! {
+                    () = converse(stream, stalled, tls, router, Arc::clone(&visitor)) => {}
+                    () = visitor.has_to_go() => {}
+                }
                 drop(place);
             });
         }
@@ -175,25 +193,40 @@ impl Server {
 }
 
 /// One connection, to its end. That it breaks off is its own affair.
-async fn converse(stream: TcpStream, stalled: Duration, tls: Option<TlsAcceptor>, router: Router) {
+async fn converse(
+    stream: TcpStream,
+    stalled: Duration,
+    tls: Option<TlsAcceptor>,
+    router: Router,
+    visitor: Arc<Visitor>,
+) {
     // Small messages are not to wait for others.
     stream.set_nodelay(true).ok();
     // Who reads nothing for so long of what is there for it has gone.
     let mut stream = Box::pin(TimeoutStream::new(stream));
     stream.as_mut().set_write_timeout_pinned(Some(stalled));
     match tls {
-        None => answer(stream, router).await,
+        None => answer(stream, router, visitor).await,
         Some(tls) => {
             if let Ok(Ok(stream)) = timeout(HEADERS_WITHIN, tls.accept(stream)).await {
-                answer(stream, router).await;
+                answer(stream, router, visitor).await;
             }
         }
     }
 }
 
-async fn answer(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, router: Router) {
+async fn answer(
+    stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
+    router: Router,
+    visitor: Arc<Visitor>,
+) {
     let mut http = hyper::server::conn::http1::Builder::new();
     http.timer(TokioTimer::new()).header_read_timeout(HEADERS_WITHIN).max_buf_size(MOST_HEADERS);
-    let service = TowerToHyperService::new(router);
+    let router = TowerToHyperService::new(router);
+    // The guard says who has shown the secret.
+    let service = hyper::service::service_fn(move |mut request: Request<Incoming>| {
+        request.extensions_mut().insert(Arc::clone(&visitor));
+        router.call(request)
+    });
     http.serve_connection(TokioIo::new(stream), service).with_upgrades().await.ok();
 }

@@ -1,6 +1,6 @@
 //! Settings as the page shows and changes them.
 
-use frameless::{ReconstructionKind, SamplerKind, Size};
+use frameless::{ReconstructionKind, SamplerKind, Size, ToneMap};
 use frameless_session::{Overlay, PictureSize, Settings};
 
 use crate::wire::{Choice, SettingsChange, SettingsState};
@@ -31,6 +31,7 @@ pub(crate) fn state(settings: &Settings) -> SettingsState {
         reconstruction: settings.reconstruction.name(),
         samples_per_sec: settings.samples_per_sec,
         exposure_stops: settings.exposure_stops,
+        tone_map: settings.tone_map.name(),
         overlay: overlay_name(settings.overlay),
         picture: picture_name(settings.picture),
     }
@@ -65,6 +66,10 @@ pub(crate) fn changed(settings: &Settings, change: &SettingsChange) -> Result<Se
             return Err(format!("an exposure of {stops} stops: wanted -64 to 64"));
         }
         new.exposure_stops = stops;
+    }
+    if let Some(name) = &change.tone_map {
+        new.tone_map = ToneMap::from_name(name)
+            .ok_or_else(|| format!("there is no tone mapping {}", quoted(name)))?;
     }
     if let Some(name) = &change.overlay {
         new.overlay = Overlay::ALL
@@ -204,6 +209,16 @@ pub(crate) fn overlays() -> Vec<Choice> {
     Overlay::ALL.into_iter().map(choice).collect()
 }
 
+/// The tone mappings.
+pub(crate) fn tone_maps() -> Vec<Choice> {
+    let choice = |tone_map: ToneMap| Choice {
+        name: tone_map.name(),
+        title: None,
+        description: tone_map.explanation(),
+    };
+    ToneMap::ALL.into_iter().map(choice).collect()
+}
+
 /// The samplers, the best first; before them the renderer's own, if it has one.
 pub(crate) fn samplers(has_own: bool) -> Vec<Choice> {
     let own = Choice {
@@ -274,12 +289,12 @@ mod tests {
     #[test]
     fn the_state_can_be_sent_back() {
         for sampler in SamplerKind::ALL {
-            for (overlay, picture) in [
-                (Overlay::Holes, PictureSize::default()),
-                (Overlay::None, PictureSize::WHOLE_WINDOW),
-                (Overlay::Change, PictureSize::Fixed(Size::new(512, 384))),
+            for (overlay, tone_map, picture) in [
+                (Overlay::Holes, ToneMap::Clip, PictureSize::default()),
+                (Overlay::None, ToneMap::Neutral, PictureSize::WHOLE_WINDOW),
+                (Overlay::Change, ToneMap::Aces, PictureSize::Fixed(Size::new(512, 384))),
             ] {
-                let set = Settings { sampler, overlay, picture, ..Settings::default() };
+                let set = Settings { sampler, overlay, tone_map, picture, ..Settings::default() };
                 let mut json = serde_json::to_value(state(&set)).unwrap();
                 json["type"] = "settings".into();
                 let back = changed(&Settings::default(), &change(&json.to_string()));
@@ -295,6 +310,7 @@ mod tests {
             (r#"{"type": "settings", "sampler": "best"}"#, "\"best\""),
             (r#"{"type": "settings", "reconstruction": "blur"}"#, "\"blur\""),
             (r#"{"type": "settings", "overlay": ""}"#, "overlay"),
+            (r#"{"type": "settings", "tone_map": "film"}"#, "\"film\""),
             (r#"{"type": "settings", "samples_per_sec": 0}"#, "samples/s"),
             (r#"{"type": "settings", "exposure_stops": 1e30}"#, "stops"),
             (r#"{"type": "settings", "temporal": 2}"#, "0 to 1"),

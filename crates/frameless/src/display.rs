@@ -1,13 +1,16 @@
-//! From linear radiance to what the display shows: exposure, then the sRGB transfer function.
+//! From linear radiance to what the display shows: exposure, tone mapping, then the sRGB transfer function.
 //!
 //! Samples are kept as linear radiance; this step comes after reconstruction, so that changing the exposure
 //! restarts nothing. Change is measured behind it, since that is what an eye sees.
+
+use crate::ToneMap;
 
 /// How linear radiance becomes a display colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Display {
     exposure_stops: f32,
     gain: f32,
+    tone_map: ToneMap,
 }
 
 impl Default for Display {
@@ -17,9 +20,14 @@ impl Default for Display {
 }
 
 impl Display {
-    /// Radiance is multiplied by 2^`exposure_stops`.
+    /// Radiance is multiplied by 2^`exposure_stops`, and what is brighter than white is white.
     pub fn new(exposure_stops: f32) -> Display {
-        Display { exposure_stops, gain: exposure_stops.exp2() }
+        Display { exposure_stops, gain: exposure_stops.exp2(), tone_map: ToneMap::Clip }
+    }
+
+    /// The same with another tone mapping.
+    pub fn with_tone_map(self, tone_map: ToneMap) -> Display {
+        Display { tone_map, ..self }
     }
 
     /// The exposure in stops (powers of two).
@@ -27,11 +35,24 @@ impl Display {
         self.exposure_stops
     }
 
+    /// How what is brighter than white is brought into range.
+    pub fn tone_map(&self) -> ToneMap {
+        self.tone_map
+    }
+
     /// Display-referred sRGB in [0, 1] of a finite linear RGB radiance.
     #[inline]
     pub fn encode(&self, rgb: [f32; 3]) -> [f32; 3] {
-        let [r, g, b] = rgb;
-        [self.encode_channel(r), self.encode_channel(g), self.encode_channel(b)]
+        match self.tone_map {
+            ToneMap::Clip => rgb.map(|channel| self.encode_channel(channel)),
+            _ => self.encode_mapped(rgb),
+        }
+    }
+
+    /// Apart, so that loops that map no tones stay small.
+    #[inline(never)]
+    fn encode_mapped(&self, rgb: [f32; 3]) -> [f32; 3] {
+        self.tone_map.apply(rgb.map(|channel| channel * self.gain)).map(srgb_from_linear)
     }
 
     /// The same in 8 bits per channel, with alpha 255.
@@ -50,7 +71,8 @@ impl Display {
     /// d = Σₖ (newₖ − oldₖ)² of two linear RGB radiances, over display-referred sRGB; in [0, 3].
     #[inline]
     pub fn change(&self, new: [f32; 3], old: [f32; 3]) -> f32 {
-        let [r, g, b] = std::array::from_fn(|k| self.squared_difference(new[k], old[k]));
+        let (new, old) = (self.encode(new), self.encode(old));
+        let [r, g, b] = std::array::from_fn(|k| squared(new[k] - old[k]));
         r + g + b
     }
 
@@ -65,22 +87,28 @@ impl Display {
         squares: &'a mut Vec<f32>,
     ) -> impl Iterator<Item = f32> + 'a {
         squares.clear();
-        let pairs = new.as_flattened().iter().zip(old.as_flattened());
-        squares.extend(pairs.map(|(&new, &old)| self.squared_difference(new, old)));
+        if self.tone_map == ToneMap::Clip {
+            let pairs = new.as_flattened().iter().zip(old.as_flattened());
+            let encode = |channel| self.encode_channel(channel);
+            squares.extend(pairs.map(|(&new, &old)| squared(encode(new) - encode(old))));
+        } else {
+            let channels = |rgb: &[f32; 3]| self.encode_mapped(*rgb);
+            let pairs = new.iter().flat_map(channels).zip(old.iter().flat_map(channels));
+            squares.extend(pairs.map(|(new, old)| squared(new - old)));
+        }
         squares.chunks_exact(3).map(|d| d[0] + d[1] + d[2])
     }
 
+    /// [`Display::encode`] of one channel, where tones are clipped.
     #[inline(always)]
-    fn squared_difference(&self, new: f32, old: f32) -> f32 {
-        let difference = self.encode_channel(new) - self.encode_channel(old);
-        difference * difference
-    }
-
-    /// [`Display::encode`] of one channel.
-    #[inline(always)]
-    pub(crate) fn encode_channel(&self, linear: f32) -> f32 {
+    fn encode_channel(&self, linear: f32) -> f32 {
         srgb_from_linear(linear * self.gain)
     }
+}
+
+#[inline(always)]
+fn squared(difference: f32) -> f32 {
+    difference * difference
 }
 
 /// The sRGB transfer function (IEC 61966-2-1) of a finite number, clamped to [0, 1]; at most 4e-5 from the exact one, a
@@ -138,11 +166,24 @@ mod tests {
         let mut colours = || -> Vec<[f32; 3]> {
             (0..101).map(|_| std::array::from_fn(|_| 1.2 * rng.unit_f32() - 0.1)).collect()
         };
-        let (new, old, display) = (colours(), colours(), Display::new(0.5));
-        let mut squares = Vec::new();
-        let many: Vec<f32> = display.changes(&new, &old, &mut squares).collect();
-        let single = new.iter().zip(&old).map(|(&new, &old)| display.change(new, old));
-        assert_eq!(many, single.collect::<Vec<_>>());
+        let (new, old) = (colours(), colours());
+        for tone_map in ToneMap::ALL {
+            let display = Display::new(0.5).with_tone_map(tone_map);
+            let mut squares = Vec::new();
+            let many: Vec<f32> = display.changes(&new, &old, &mut squares).collect();
+            let single = new.iter().zip(&old).map(|(&new, &old)| display.change(new, old));
+            assert_eq!(many, single.collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn highlights_that_are_clipped_can_be_told_apart_where_tones_are_mapped() {
+        for tone_map in ToneMap::ALL {
+            let display = Display::default().with_tone_map(tone_map);
+            let is_clip = tone_map == ToneMap::Clip;
+            assert_eq!(display.change([3.0; 3], [1.5; 3]) == 0.0, is_clip, "{tone_map:?}");
+            assert_eq!(display.encode([0.0; 3]), [0.0; 3]);
+        }
     }
 
     #[test]

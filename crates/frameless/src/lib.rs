@@ -47,6 +47,7 @@ mod tile;
 mod tile_pdf;
 mod time;
 mod timeline;
+mod tone_map;
 mod tracer;
 mod weights;
 mod wide;
@@ -79,5 +80,6 @@ pub use reconstruction::{
     Filter, Findings, Hold, Kept, Reconstruction, ReconstructionKind, Refresh, Reproject,
     ReprojectOptions, ReprojectStage, hold, hold_into,
 };
+pub use tone_map::ToneMap;
 
 pub use rng::Rng;

@@ -59,6 +59,27 @@ fn exposure_makes_a_picture_darker() {
 }
 
 #[test]
+fn tone_mapping_keeps_what_would_be_clipped_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let white = |tone_map: &[&str]| {
+        let out = folder.path().join("picture.png");
+        let out = out.to_string_lossy();
+        let mut arguments =
+            vec!["render", "sphere", "--size", "32x24", "--exposure", "3", "--out", &out];
+        arguments.extend(tone_map);
+        frameless(&arguments).succeeded();
+        let picture = image::open(out.as_ref()).unwrap().to_rgb8();
+        picture.pixels().flat_map(|pixel| pixel.0).filter(|&channel| channel == 255).count()
+    };
+    let clipped = white(&[]);
+    assert!(clipped > 100, "{clipped} channels are white");
+    assert_eq!(white(&["--tone-map", "clip"]), clipped);
+    for other in ["neutral", "aces"] {
+        assert!(white(&["--tone-map", other]) < clipped / 4, "{other}");
+    }
+}
+
+#[test]
 fn a_pixel_is_told_step_by_step() {
     let told = frameless(&["trace", "sphere", "--pixel", "256,192", "--time", "0.5"]);
     assert!(told.succeeded().out.lines().count() > 3);

@@ -69,14 +69,14 @@ impl Outgoing {
 
     /// Chooses and encodes.
     pub(super) fn make(mut self, picture: Arc<Published>, room: &Room) -> Ready {
-        let ms_at = |at: Instant| at.saturating_duration_since(self.begun).as_millis() as u32 + 1;
+        let ms_at = |at: Instant| at.saturating_duration_since(self.begun).as_millis() as u64 + 1;
         let times = Times { now_ms: ms_at(Instant::now()), calm_ms: ms_at(picture.calm_at) };
         let largest = if times.are_calm() { LARGEST_CALM } else { LARGEST_MOVING };
         let bytes = room.bytes.min(largest);
         let tiles = self.cost.map(|cost| (bytes as f64 / cost) as usize);
         let refine = self.credit >= self.cost[1];
         let chosen = self.seen.choose(&picture, times, tiles, refine);
-        let wait = chosen.wait_ms.map(|ms| Duration::from_millis(ms.into()));
+        let wait = chosen.wait_ms.map(Duration::from_millis);
         if chosen.tiles.is_empty() {
             return self.nothing(picture, chosen.all_exact, wait);
         }

@@ -44,15 +44,26 @@ impl<W: Send + 'static> Hub<W> {
         self.open(name.to_owned(), open, None);
     }
 
+    /// Who has that token, if it may send a file now.
+    pub(super) fn uploader(&mut self, token: &str) -> Result<u32, UploadRefused> {
+        let client = self.roster.with_token(token).ok_or(UploadRefused::Stranger)?;
+        self.may_upload(client)?;
+        Ok(client)
+    }
+
+    fn may_upload(&mut self, client: u32) -> Result<(), UploadRefused> {
+        match &self.scenes {
+            None => Err(UploadRefused::NoScenes),
+            Some(_) if !self.roster.may_act(client) => Err(UploadRefused::NotDriving),
+            Some(_) if self.opening.is_some() => Err(UploadRefused::Busy),
+            Some(_) => Ok(()),
+        }
+    }
+
     pub(super) fn upload(&mut self, upload: Upload) {
         let Upload { client, name, bytes, answer } = upload;
-        let refused = match &self.scenes {
-            None => Some(UploadRefused::NoScenes),
-            Some(_) if !self.roster.may_act(client) => Some(UploadRefused::NotDriving),
-            Some(_) if self.opening.is_some() => Some(UploadRefused::Busy),
-            Some(_) => None,
-        };
-        if let Some(refused) = refused {
+        // It may have lost the helm meanwhile.
+        if let Err(refused) = self.may_upload(client) {
             // Fails if the client has gone.
             answer.send(Err(refused)).ok();
             return;

@@ -6,6 +6,7 @@ mod flow;
 mod grid;
 mod publish;
 mod seen;
+mod smooth;
 #[cfg(test)]
 mod traffic;
 
@@ -15,6 +16,7 @@ pub(crate) use flow::Flow;
 pub(crate) use grid::{Grid, SIDE};
 pub(crate) use publish::{Published, Publisher, Taken};
 pub(crate) use seen::{Seen, Times};
+use smooth::Mean;
 
 #[cfg(test)]
 pub(crate) use publish::tests::{picture, published};

@@ -11,7 +11,7 @@ use foldhash::quality::FixedState;
 use frameless::Size;
 use frameless_session::Picture;
 
-use super::Grid;
+use super::{Grid, Mean};
 
 /// A change of a tile that is seen: mean squared difference of its pixels (Σ over the channels, 8 bits each). A pixel in a hundred
 /// that is off by six steps in each channel, or one that is off by thirty.
@@ -35,6 +35,8 @@ pub(crate) struct Published {
     pub(crate) digests: Vec<u64>,
     /// Per tile: squared differences from one published picture to the next, summed over all since the generation began.
     pub(crate) change_sums: Vec<u64>,
+    /// Per tile: its mean colour, if it has no detail.
+    pub(crate) means: Vec<Option<Mean>>,
     /// From then on nothing that is seen has changed for a while, if no other picture is published.
     pub(crate) calm_at: Instant,
     /// Pairs of client and its last input that the picture shows.
@@ -137,9 +139,11 @@ impl Publisher {
             return Taken::Same(picture.rgba);
         }
         let (mut digests, mut change_sums) = (last.digests.clone(), last.change_sums.clone());
+        let mut means = last.means.clone();
         for (tile, difference) in differences.into_iter().enumerate().filter(|(_, sum)| *sum > 0) {
             digests[tile] = digest(&grid, tile, &picture.rgba);
             change_sums[tile] += difference;
+            means[tile] = Mean::of(&grid, tile, &picture.rgba);
         }
         let published = Published {
             number: last.number.wrapping_add(1),
@@ -148,6 +152,7 @@ impl Publisher {
             rgba: picture.rgba,
             digests,
             change_sums,
+            means,
             calm_at: self.seen_at + CALM,
             inputs,
             crc: OnceLock::new(),
@@ -181,6 +186,7 @@ fn first(
         size: picture.size,
         digests: (0..grid.len()).map(|tile| digest(&grid, tile, &picture.rgba)).collect(),
         change_sums: vec![0; grid.len()],
+        means: (0..grid.len()).map(|tile| Mean::of(&grid, tile, &picture.rgba)).collect(),
         rgba: picture.rgba,
         calm_at: now,
         inputs,

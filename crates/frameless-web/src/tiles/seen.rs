@@ -3,23 +3,23 @@
 //! A tile that has visibly changed is sent lossily, those first that changed most times waited longest. Once it has been quiet it is sent
 //! exactly. Differences that nobody sees are sent exactly, too, and ever more seldom while the rest of the picture moves.
 
-use super::{Grid, Published};
+use super::{Grid, Mean, Published};
 
 /// A change that is worth JPEG: mean squared difference of a tile's pixels (Σ over the channels, 8 bits each), five steps in each channel. JPEG's own error
 /// is half of this: below, much would be sent to gain little, and a tile that is exact by now would become worse. Seven pixels in the
 /// tile that are off by 32 in each channel are more.
 const WORTH_LOSSY: f64 = 80.0;
 /// A tile that has not changed for so long is sent exactly.
-const QUIET_MS: u32 = 120;
+const QUIET_MS: u64 = 120;
 /// One that goes on changing, in a way that is not worth JPEG, is sent exactly all the same after so long: the first time, the second, and from
 /// then on. Antialiasing goes on for seconds, and each of its steps in each tile would be as much as what really moves.
-const UNSEEN_MS: [u32; 3] = [1000, 4000, 8000];
+const UNSEEN_MS: [u64; 3] = [1000, 4000, 8000];
 /// A tile that was never sent comes before any change: the largest possible change of a tile.
 const NEVER: f64 = 3.0 * 255.0 * 255.0;
 /// In one message. 1536 · 16 · 16 pixels are 1.2 MB of RGB, which each client may hold while it is encoded.
 const MOST_TILES: usize = 1536;
 
-/// Of one client. 40 bytes per tile.
+/// Of one client. 56 bytes per tile.
 pub(crate) struct Seen {
     generation: u32,
     tiles: Vec<Tile>,
@@ -32,12 +32,14 @@ struct Tile {
     /// When it was sent, see [`Published::change_sums`].
     change_sum: u64,
     /// When it was sent last.
-    sent_ms: u32,
+    sent_ms: u64,
     /// When its bytes were seen to change last, and to what.
-    stirred_ms: u32,
+    stirred_ms: u64,
     latest: u32,
     /// Since when it has been different in a way that is seen; 0: it is not.
-    waiting_ms: u32,
+    waiting_ms: u64,
+    /// Of what was sent, if that had no detail.
+    mean: Option<Mean>,
     sent: bool,
     exact: bool,
     exactly: u8,
@@ -46,9 +48,9 @@ struct Tile {
 /// In milliseconds of a clock of the caller's that begins above 0.
 #[derive(Clone, Copy)]
 pub(crate) struct Times {
-    pub(crate) now_ms: u32,
+    pub(crate) now_ms: u64,
     /// Of [`Published::calm_at`].
-    pub(crate) calm_ms: u32,
+    pub(crate) calm_ms: u64,
 }
 
 impl Times {
@@ -70,13 +72,13 @@ pub(crate) struct Chosen {
     /// The canvas is the published picture, once all before this is drawn.
     pub(crate) all_exact: bool,
     /// When there will be something to refine, if nothing changes before.
-    pub(crate) wait_ms: Option<u32>,
+    pub(crate) wait_ms: Option<u64>,
 }
 
 enum Need {
     Nothing,
     Lossy { priority: f64 },
-    Exact { in_ms: u32 },
+    Exact { in_ms: u64 },
 }
 
 impl Seen {
@@ -140,7 +142,7 @@ impl Seen {
     }
 
     /// Tiles of the picture are on their way.
-    pub(crate) fn sent(&mut self, picture: &Published, chosen: &Chosen, now_ms: u32) {
+    pub(crate) fn sent(&mut self, picture: &Published, chosen: &Chosen, now_ms: u64) {
         for &index in &chosen.tiles {
             let tile = &mut self.tiles[usize::from(index)];
             tile.exactly = match chosen.lossless {
@@ -149,6 +151,7 @@ impl Seen {
             };
             tile.digest = picture.digests[usize::from(index)];
             tile.change_sum = picture.change_sums[usize::from(index)];
+            tile.mean = picture.means[usize::from(index)];
             (tile.sent_ms, tile.waiting_ms) = (now_ms, 0);
             (tile.sent, tile.exact) = (true, chosen.lossless);
         }
@@ -172,12 +175,14 @@ impl Tile {
             true => changed as f64 / f64::from(grid.pixels(index)),
             false => NEVER,
         };
-        if !same && change >= WORTH_LOSSY {
+        let means = self.mean.zip(picture.means[index]);
+        let has_another_tone = means.is_some_and(|(sent, now)| now.is_seen_beside(sent));
+        if !same && (change >= WORTH_LOSSY || has_another_tone) {
             if self.waiting_ms == 0 {
                 self.waiting_ms = now_ms;
             }
             let waited_ms = now_ms - self.waiting_ms + 1;
-            return Need::Lossy { priority: change * f64::from(waited_ms) };
+            return Need::Lossy { priority: change * waited_ms as f64 };
         }
         self.waiting_ms = 0;
         let unseen_ms = UNSEEN_MS[usize::from(self.exactly).min(UNSEEN_MS.len() - 1)];
@@ -239,12 +244,12 @@ mod tests {
     }
 
     /// While the picture moves.
-    fn at(now_ms: u32) -> Times {
-        Times { now_ms, calm_ms: u32::MAX }
+    fn at(now_ms: u64) -> Times {
+        Times { now_ms, calm_ms: u64::MAX }
     }
 
     /// Chooses, and sends what was chosen.
-    fn send(seen: &mut Seen, shown: &Published, now_ms: u32, most: [usize; 2]) -> Chosen {
+    fn send(seen: &mut Seen, shown: &Published, now_ms: u64, most: [usize; 2]) -> Chosen {
         let chosen = seen.choose(shown, at(now_ms), most, false);
         seen.sent(shown, &chosen, now_ms);
         chosen
@@ -262,6 +267,18 @@ mod tests {
         assert_eq!((exact.tiles, exact.lossless, exact.all_exact), (vec![0, 1, 2, 3], true, false));
         let done = seen.choose(&shown, at(1000), PLENTY, true);
         assert_eq!(done, Chosen { all_exact: true, ..Chosen::default() });
+    }
+
+    #[test]
+    fn fifty_days_are_no_turn_of_the_clock() {
+        let (mut scene, mut seen) = (Scene::new(), Seen::nothing());
+        let begin = u64::from(u32::MAX) - 10;
+        send(&mut seen, &scene.show(), begin, PLENTY);
+        let shown = scene.flip(1, 60, 128);
+        let moved = send(&mut seen, &shown, begin + 20, PLENTY);
+        assert_eq!((moved.tiles, moved.lossless), (vec![1], false));
+        let exact = send(&mut seen, &shown, begin + 20 + QUIET_MS, PLENTY);
+        assert_eq!((exact.tiles, exact.lossless), (vec![0, 1, 2, 3], true));
     }
 
     fn exact_everywhere(scene: &mut Scene) -> Seen {
@@ -305,7 +322,7 @@ mod tests {
                 sent.push(ms);
             }
         }
-        let pauses: Vec<u32> = sent.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let pauses: Vec<u64> = sent.windows(2).map(|pair| pair[1] - pair[0]).collect();
         assert!(pauses.is_sorted() && pauses.len() <= 3, "{pauses:?}");
     }
 
@@ -321,6 +338,22 @@ mod tests {
         assert_eq!((calm.tiles, calm.lossless), (vec![0], true));
         let soon = seen.choose(&shown, Times { now_ms: 1000, calm_ms: 1050 }, PLENTY, false);
         assert_eq!(soon.wait_ms, Some(50));
+    }
+
+    #[test]
+    fn what_has_no_detail_is_followed_step_by_step() {
+        let (mut scene, mut seen) = (Scene::new(), Seen::nothing());
+        let mut rgba = scene.rgba.clone();
+        // Tile 3 has detail.
+        rgba.iter_mut().skip(3 * SIDE as usize).step_by(4 * SIDE as usize).for_each(|p| p[0] = 200);
+        scene.rgba = rgba;
+        let shown = scene.show();
+        send(&mut seen, &shown, 1, PLENTY);
+        send(&mut seen, &shown, 500, PLENTY);
+        // A slow fade, each step of which is far less than is worth sending anywhere else.
+        scene.rgba.iter_mut().for_each(|[r, g, b, _]| (*r, *g, *b) = (*r + 1, *g + 1, *b + 1));
+        let faded = send(&mut seen, &scene.show(), 1000, PLENTY);
+        assert_eq!((faded.tiles, faded.lossless), (vec![0, 1, 2], false));
     }
 
     #[test]
@@ -342,7 +375,7 @@ mod tests {
         let shown = published(Publisher::new(now).take(black, Vec::new(), false, now));
         let mut seen = Seen::nothing();
         assert_eq!(seen.choose(&shown, at(1), [usize::MAX; 2], true).tiles.len(), MOST_TILES);
-        assert_eq!(size_of::<Tile>(), 40);
-        assert!(seen.bytes() < 1_500_000, "{} bytes for the largest picture", seen.bytes());
+        assert_eq!(size_of::<Tile>(), 56);
+        assert!(seen.bytes() < 1_900_000, "{} bytes for the largest picture", seen.bytes());
     }
 }

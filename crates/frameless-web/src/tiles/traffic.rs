@@ -43,8 +43,8 @@ fn measure(scene: &str, pictures_per_sec: u32, from_secs: f64, secs: f64) -> Mea
         let Taken::New(shown) = taken else { continue };
         let counts = now_secs > from_secs;
         for exact_tiles in [0, 32] {
-            let now_ms = (1000.0 * now_secs) as u32;
-            let times = Times { now_ms, calm_ms: u32::MAX };
+            let now_ms = (1000.0 * now_secs) as u64;
+            let times = Times { now_ms, calm_ms: u64::MAX };
             let chosen = seen.choose(&shown, times, [2048, exact_tiles], exact_tiles > 0);
             if chosen.tiles.is_empty() {
                 continue;

@@ -109,6 +109,8 @@ pub struct SettingsChange {
     /// In stops.
     pub exposure_stops: Option<f32>,
     /// By its name.
+    pub tone_map: Option<String>,
+    /// By its name.
     pub overlay: Option<String>,
     /// By its name, or a size.
     pub picture: Option<String>,

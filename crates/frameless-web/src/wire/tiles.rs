@@ -10,8 +10,6 @@ pub enum Codec {
     Jpeg = 1,
     /// PNG.
     Png = 2,
-    /// WebP.
-    WebP = 3,
 }
 
 impl Codec {
@@ -19,9 +17,8 @@ impl Codec {
         match byte {
             1 => Ok(Codec::Jpeg),
             2 => Ok(Codec::Png),
-            3 => Ok(Codec::WebP),
             came => {
-                let (what, wanted) = ("codec", "1 (JPEG), 2 (PNG) or 3 (WebP)");
+                let (what, wanted) = ("codec", "1 (JPEG) or 2 (PNG)");
                 Err(WireError::Value { what, wanted, came: came.to_string() })
             }
         }
@@ -172,7 +169,7 @@ mod tests {
     fn fields_that_contradict_each_other_are_refused() {
         // Type, version, codec, flags, side, count, columns, reserved, a tile outside the picture.
         for (at, value) in
-            [(0, 2), (1, 2), (2, 4), (3, 2), (16, 33), (18, 0), (28, 0), (28, 4), (30, 1), (32, 12)]
+            [(0, 2), (1, 2), (2, 3), (3, 2), (16, 33), (18, 0), (28, 0), (28, 4), (30, 1), (32, 12)]
         {
             let mut other = GOLDEN;
             other[at] = value;

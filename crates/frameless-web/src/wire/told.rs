@@ -14,16 +14,18 @@ pub enum Told {
         program: &'static str,
         /// The client's number.
         client: u32,
+        /// By which the client is recognised: in uploads, and when it comes back after its connection was lost.
+        token: String,
         /// The largest upload; 0 where there are no scenes.
         upload_bytes: u64,
         /// The built-in scenes.
         scenes: Vec<Choice>,
         /// Who may choose the pixels.
         samplers: Vec<Choice>,
+        /// How what is brighter than white may be brought into range.
+        tone_maps: Vec<Choice>,
         /// What may be shown instead of the picture.
         overlays: Vec<Choice>,
-        /// Of a picture.
-        most_pixels: usize,
     },
     /// Another scene is shown.
     Scene {
@@ -139,6 +141,8 @@ pub struct SettingsState {
     pub samples_per_sec: Option<f64>,
     /// In stops.
     pub exposure_stops: f32,
+    /// By its name.
+    pub tone_map: &'static str,
     /// By its name.
     pub overlay: &'static str,
     /// `window`, `whole-window`, or a size.

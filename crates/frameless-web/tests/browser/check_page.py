@@ -110,6 +110,22 @@ def moves_with_the_hands(bench: Bench) -> str:
     changed("panning", lambda: view.drag(button="right"))
     changed("zooming", lambda: mouse.wheel(0, -300))
     changed("flying", lambda: (keyboard.down("w"), view.page.wait_for_timeout(300), keyboard.up("w")))
+    changed("orbiting by keys", lambda: hold(view, "ArrowRight"))
+    changed("panning by keys", lambda: hold(view, "Shift", "ArrowUp"))
+    changed("zooming by keys", lambda: hold(view, "+"))
+    # Chosen with the mouse: the next key is the picture's, and not the list's.
+    view.page.locator("#size").click()
+    view.page.keyboard.press("Escape")
+    view.page.focus("#size")
+    size = view.page.input_value("#size")
+    changed("a key after a list", lambda: hold(view, "ArrowLeft"))
+    assert view.page.input_value("#size") == size, "the list has taken the key"
+    keyboard.press("Tab")
+    view.page.focus("#size")
+    keyboard.press("Home")
+    assert view.page.evaluate("document.activeElement.id") == "size", "who came by the tab key stays at the list"
+    view.page.select_option("#size", size)
+    keyboard.press("Escape")
     changed("coming back", lambda: keyboard.press("Home"))
     assert view.page.input_value("#camera") == "0"
     back = psnr(seen[0], seen[-1])
@@ -118,6 +134,14 @@ def moves_with_the_hands(bench: Bench) -> str:
     latencies = view.page.evaluate("seen.latencies")
     assert latencies, "no latency was measured"
     return f"input to pixel {np.median(latencies):.0f} ms (median of {len(latencies)})"
+
+
+def hold(view: View, *keys: str) -> None:
+    for key in keys:
+        view.page.keyboard.down(key)
+    view.page.wait_for_timeout(300)
+    for key in reversed(keys):
+        view.page.keyboard.up(key)
 
 
 def is_touched_with_fingers(bench: Bench) -> str:
@@ -168,7 +192,16 @@ def shows_overlays_with_legends(bench: Bench) -> str:
     view.page.keyboard.press("0")
     view.wait("document.querySelector('#legend').hidden")
     assert len(set(titles)) == 6, titles
-    return "six"
+    view.page.select_option("#sampler", "random")
+    view.page.keyboard.press("5")
+    view.wait("!document.querySelector('#no-overlay').hidden")
+    said = view.text("#no-overlay")
+    assert "random" in said and "learned rate" in said, said
+    view.page.select_option("#sampler", "adaptive")
+    view.wait("document.querySelector('#no-overlay').hidden")
+    view.page.keyboard.press("0")
+    view.wait("document.querySelector('#legend').hidden")
+    return "six, and one that a sampler has not got"
 
 
 def plays_and_scrubs(bench: Bench) -> str:
@@ -233,6 +266,9 @@ def sets_what_the_panel_offers(bench: Bench) -> str:
     other.wait("Number(document.querySelector('#hud-samples').textContent.replaceAll(',', '')) < 115000")
     page.uncheck("#limited")
     page.locator("#exposure").fill("0")
+    page.select_option("#tone-map", "neutral")
+    other.wait("document.querySelector('#tone-map').value === 'neutral'")
+    page.select_option("#tone-map", "clip")
     page.check("[name=reconstruction][value=reproject]", force=True)
     page.uncheck("#antialias")
     page.select_option("#sampler", "adaptive")
@@ -252,6 +288,11 @@ def hands_the_helm_over(bench: Bench) -> str:
     second.wait("document.querySelector('#controls').disabled")
     second.drag()
     second.wait("document.querySelector('#messages').textContent.includes('take the controls')")
+    for key in ("Space", "2", "w"):
+        second.page.keyboard.press("Escape")
+        second.wait("document.querySelector('#messages').children.length === 0")
+        second.page.keyboard.press(key, delay=60)
+        second.wait("document.querySelector('#messages').textContent.includes('take the controls')")
     second.page.click("#drive")
     second.wait("!document.querySelector('#controls').disabled")
     first.wait("document.querySelector('#controls').disabled")
@@ -314,6 +355,7 @@ def saves_and_records(bench: Bench) -> str:
     download.value.save_as(path)
     saved = np.asarray(Image.open(path).convert("RGB"))
     assert saved.shape == shown.shape and psnr(saved, shown) > 45, f"the PNG is another picture ({psnr(saved, shown):.1f} dB)"
+    assert np.array_equal(saved, view.server_pixels()), "the PNG is not the server's picture"
     view.page.check("#antialias")
     view.page.click("#play")
     own = recorded(bench, view)
@@ -370,6 +412,32 @@ def comes_back_by_itself(bench: Bench) -> str:
     view.complaints[:] = [text for text in view.complaints if "net::ERR_CONNECTION" not in text]
     assert secs <= 5, f"{secs:.1f} s"
     return f"{secs:.1f} s after the server was there again"
+
+
+def says_why_it_cannot_come_back(bench: Bench) -> str:
+    with Server(bench.program, *SCENE) as first:
+        view = bench.open(first.url)
+        port = first.port
+    view.wait("!document.querySelector('#banner').hidden")
+    texts = "window.texts = [...(window.texts ?? []), document.querySelector('#banner-text').textContent]"
+    with Server(bench.program, *SCENE, port=port) as other:
+        view.wait("document.querySelector('#banner-text').textContent.includes('open the address')")
+        assert view.page.locator("#banner-spinner").is_hidden()
+        for _ in range(12):
+            view.page.evaluate(texts)
+            view.page.wait_for_timeout(250)
+        said = set(view.page.evaluate("texts"))
+        assert len(said) == 1, said
+        view.page.goto(other.url)
+        view.live()
+        refusals = other.stderr().count("was turned away")
+    # One that has no room: whatever the page's WebSocket is told, the page is not.
+    view.page.route("**/clients", lambda route: route.fulfill(json={"clients": 64, "most": 64}))
+    view.wait("document.querySelector('#banner-text').textContent.includes('full')")
+    view.context.close()
+    view.complaints[:] = [text for text in view.complaints if not any(sign in text for sign in ("net::ERR_", "403"))]
+    assert refusals in (1, 2), f"{refusals} lines about requests that were turned away"
+    return "another secret, no room"
 
 
 def is_accessible(bench: Bench) -> str:
@@ -448,6 +516,7 @@ CHECKS = [
     uploads_scenes,
     saves_and_records,
     comes_back_by_itself,
+    says_why_it_cannot_come_back,
     is_accessible,
     refuses_broken_messages,
 ]

@@ -139,14 +139,14 @@ class View:
     def pixels(self) -> np.ndarray:
         """What the canvas holds: height × width × 3, bytes."""
         url = self.page.evaluate("document.querySelector('#picture').toDataURL('image/png')")
-        return _image(base64.b64decode(url.split(",", 1)[1]))
+        return image(base64.b64decode(url.split(",", 1)[1]))
 
     def server_pixels(self) -> np.ndarray:
         """The server's newest picture."""
         origin = "{0.scheme}://{0.netloc}".format(urlsplit(self.page.url))
         answer = self.page.request.get(f"{origin}/picture.png")
         assert answer.ok, f"/picture.png: {answer.status}"
-        return _image(answer.body())
+        return image(answer.body())
 
     def size(self) -> list[int]:
         return self.page.evaluate("(c => [c.width, c.height])(document.querySelector('#picture'))")
@@ -196,7 +196,7 @@ document.addEventListener("frameless:latency", (event) => seen.latencies.push(ev
 """
 
 
-def _image(png: bytes) -> np.ndarray:
+def image(png: bytes) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).copy()
 
 

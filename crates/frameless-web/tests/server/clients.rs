@@ -119,3 +119,32 @@ fn a_client_that_stalls_is_dropped_and_the_others_stay() {
     assert!(ended >= stalled / 2, "{ended:?}");
     other.state("alone", |state| state["clients"] == 1);
 }
+
+#[test]
+fn a_page_that_was_cut_off_has_its_helm_back() {
+    let running = start(options());
+    // It is there, and says nothing: as if its network had broken.
+    let mut ghost = Client::connect(&running);
+    let mut other = Client::connect(&running);
+    let ghosts = ghost.number;
+    other.state("the first drives", |state| state["driver"] == ghosts);
+    let mut stranger = Client::resume(&running, &"0".repeat(64));
+    stranger.state("a wrong token gives nothing", |state| {
+        state["driver"] == ghosts && state["clients"] == 3
+    });
+    let mut back = Client::resume(&running, &ghost.token);
+    let heir = back.number;
+    assert!(heir != ghosts && back.token != ghost.token);
+    back.state("it drives", |state| state["driver"] == heir && state["clients"] == 3);
+    other.state("it drives", |state| state["driver"] == heir);
+    ghost.draws = false;
+    let begin = Instant::now();
+    while !matches!(ghost.receive(Duration::from_millis(50)), Received::Closed(_)) {
+        assert!(begin.elapsed() < Duration::from_secs(10), "the ghost stays");
+    }
+    // The token was good for once, and who watched still watches.
+    let mut again = Client::resume(&running, &ghost.token);
+    again.state("it watches", |state| state["driver"] == heir);
+    let mut watcher = Client::resume(&running, &other.token);
+    watcher.state("it watches", |state| state["driver"] == heir && state["clients"] == 4);
+}

@@ -1,15 +1,27 @@
 //! Who is let in: the request matrix, the headers, and where the server listens.
 
+use std::io::Write;
 use std::net::TcpStream;
+use std::time::Duration;
 
+use frameless::Size;
 use frameless_web::{Options, Server};
 
-use crate::support::{Client, options, start};
+use crate::support::{Answer, Client, Received, options, start, start_at};
 
 const METHODS: [&str; 9] =
     ["GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS", "PATCH", "TRACE", "BREW"];
-const PATHS: [&str; 8] =
-    ["/", "/stream", "/picture.png", "/upload", "/main.js", "/recording.mp4", "/nothing", "/..%2f"];
+const PATHS: [&str; 9] = [
+    "/",
+    "/stream",
+    "/clients",
+    "/picture.png",
+    "/upload",
+    "/main.js",
+    "/recording.mp4",
+    "/nothing",
+    "/..%2f",
+];
 
 /// What makes a request unwelcome, as header lines; `{port}`, `{key}` and so on are filled in.
 const FOREIGN: [(&str, &str); 30] = [
@@ -159,10 +171,7 @@ fn what_acts_needs_an_origin() {
                    Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
     let ask = |request: String| running.ask(request.as_bytes()).status;
     assert_eq!(ask(format!("GET /stream HTTP/1.1\r\n{pass}{upgrade}\r\n")), 403);
-    assert_eq!(
-        ask(format!("POST /upload?client=1 HTTP/1.1\r\n{pass}Content-Length: 0\r\n\r\n")),
-        403
-    );
+    assert_eq!(ask(format!("POST /upload HTTP/1.1\r\n{pass}Content-Length: 0\r\n\r\n")), 403);
     let origin = running.origin();
     assert_eq!(
         ask(format!("GET /stream HTTP/1.1\r\n{pass}Origin: {origin}\r\n{upgrade}\r\n")),
@@ -277,4 +286,56 @@ fn it_listens_on_this_machines_own_address_only() {
     // 127.0.0.1 as the kernel writes it, lowest byte first.
     assert_eq!(listening, ["0100007F"]);
     assert!(TcpStream::connect(running.address).is_ok());
+}
+
+#[test]
+fn who_has_not_got_the_secret_keeps_nobody_out() {
+    let running = start(options());
+    let mut client = Client::connect(&running);
+    // Connected, and known by a request.
+    let pass = running.pass();
+    let request = format!("GET /main.js HTTP/1.1\r\n{pass}\r\n");
+    let mut known = TcpStream::connect(running.address).unwrap();
+    let answers = |stream: &mut TcpStream| {
+        stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+        stream.write_all(request.as_bytes()).ok();
+        Answer::read(stream, false).status
+    };
+    assert_eq!(answers(&mut known), 200);
+    // Far more than there are places, and they say nothing, or half a request.
+    let strangers: Vec<TcpStream> = (0..400)
+        .map(|i| {
+            let mut stranger = TcpStream::connect(running.address).unwrap();
+            stranger.write_all(if i % 2 == 0 { b"GET / HT" } else { b"" }).ok();
+            stranger
+        })
+        .collect();
+    assert_eq!(running.get("/").status, 200, "a new one is let in");
+    assert_eq!(answers(&mut known), 200, "who was known stays");
+    Client::connect(&running);
+    client.until("a status", |_, received| matches!(received, Received::Status(_)).then_some(()));
+    drop(strangers);
+}
+
+#[test]
+fn pictures_are_sent_two_at_a_time_and_the_others_are_told_when_to_ask_again() {
+    // Large enough to be a while in the making.
+    let running = start_at(options(), Size::new(1920, 1080));
+    let mut client = Client::connect(&running);
+    client.until("tiles", |_, received| matches!(received, Received::Tiles(_)).then_some(()));
+    let answers: Vec<Answer> = std::thread::scope(|scope| {
+        let asking: Vec<_> = (0..12).map(|_| scope.spawn(|| running.get("/picture.png"))).collect();
+        asking.into_iter().map(|answer| answer.join().unwrap()).collect()
+    });
+    let (sent, refused): (Vec<&Answer>, Vec<_>) =
+        answers.iter().partition(|answer| answer.status == 200);
+    assert!(!sent.is_empty() && !refused.is_empty(), "{} sent", sent.len());
+    for answer in sent {
+        assert_eq!(answer.header("content-length"), Some(&*answer.body.len().to_string()));
+        assert!(image::load_from_memory(&answer.body).is_ok());
+    }
+    for answer in refused {
+        assert_eq!((answer.status, answer.header("retry-after")), (503, Some("1")));
+    }
+    assert_eq!(running.get("/picture.png").status, 200, "their turns have ended");
 }

@@ -4,6 +4,7 @@ use std::io::{Read, Write};
 use std::time::{Duration, Instant};
 
 use frameless::Size;
+use frameless_web::Options;
 
 use crate::support::{Client, PATIENCE, Received, options, start, start_at};
 
@@ -115,6 +116,7 @@ fn every_setting_can_be_set_and_is_told() {
         (r#"{"type": "settings", "samples_per_sec": 5000}"#, "samples_per_sec", "5000.0"),
         (r#"{"type": "settings", "samples_per_sec": null}"#, "samples_per_sec", "null"),
         (r#"{"type": "settings", "exposure_stops": -1}"#, "exposure_stops", "-1.0"),
+        (r#"{"type": "settings", "tone_map": "aces"}"#, "tone_map", "\"aces\""),
     ] {
         client.say(say);
         let want: serde_json::Value = serde_json::from_str(want).unwrap();
@@ -142,36 +144,64 @@ fn scenes_are_opened_by_name_and_by_upload_and_nothing_else() {
     client.say(r#"{"type": "open", "name": "/etc/passwd"}"#);
     client.notice("no built-in scene");
 
-    let upload = |query: &str, origin: &str, body: &[u8]| {
+    let own = running.origin();
+    let token = client.token.clone();
+    let upload = |token: &str, origin: &str, body: &[u8]| {
         let (pass, length) = (running.pass(), body.len());
         let head = format!(
-            "POST /upload?{query} HTTP/1.1\r\n{pass}Origin: {origin}\r\nContent-Length: {length}\r\n\r\n"
+            "POST /upload?name=my%20scene.glb HTTP/1.1\r\n{pass}Origin: {origin}\r\nX-Client: {token}\r\n\
+             Content-Length: {length}\r\n\r\n"
         );
         running.ask(&[head.as_bytes(), body].concat())
     };
-    let own = running.origin();
-    let query = format!("client={}&name=my%20scene.glb", client.number);
-    let bad = upload(&query, &own, b"not a scene");
+    let bad = upload(&token, &own, b"not a scene");
     let text = String::from_utf8_lossy(&bad.body).into_owned();
     assert_eq!(bad.status, 422, "{text}");
     assert!(text.contains("my scene.glb"), "{text}");
     let outside = br#"{"asset": {"version": "2.0"}, "buffers": [{"byteLength": 4, "uri": "../../secret.bin"}]}"#;
-    let relative = upload(&query, &own, outside);
+    let relative = upload(&token, &own, outside);
     assert_eq!(relative.status, 422, "{}", String::from_utf8_lossy(&relative.body));
     let good = br#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{}]}"#;
-    let good = upload(&query, &own, good);
+    let good = upload(&token, &own, good);
     assert_eq!(good.status, 200, "{}", String::from_utf8_lossy(&good.body));
     assert_eq!(client.json("scene")["name"], "my scene.glb");
-    assert_eq!(upload("client=999&name=x", &own, b"{}").status, 403);
-    assert_eq!(upload(&query, "http://localhost:1", b"{}").status, 403);
+    assert_eq!(upload(&token, "http://localhost:1", b"{}").status, 403);
+}
+
+#[test]
+fn an_upload_is_refused_before_it_is_read() {
+    let running = start(options());
+    let driver = Client::connect(&running);
+    let watcher = Client::connect(&running);
+    let (pass, origin) = (running.pass(), running.origin());
+    // A body is announced, and never sent: whoever waited for it would not answer.
+    let refused = |query: &str, lines: &str| {
+        let begin = Instant::now();
+        let answer = running.ask(
+            format!(
+                "POST /upload{query} HTTP/1.1\r\n{pass}Origin: {origin}\r\n{lines}Content-Length: 900\r\n\r\n"
+            )
+            .as_bytes(),
+        );
+        assert!(begin.elapsed() < Duration::from_secs(5), "{lines}: {:?}", begin.elapsed());
+        (answer.status, String::from_utf8_lossy(&answer.body).into_owned())
+    };
+    let own = |client: &Client| format!("X-Client: {}\r\n", client.token);
+    assert_eq!(refused("", "").0, 403, "no token");
+    assert_eq!(refused("", &format!("X-Client: {}\r\n", driver.number)).0, 403, "a number");
+    let short = format!("X-Client: {}\r\n", &driver.token[1..]);
+    assert_eq!(refused("", &short).0, 403, "a part of a token");
+    let (status, text) = refused("", &own(&watcher));
+    assert!(status == 403 && text.contains("drives"), "{status} {text}");
+    assert_eq!(refused("?client=1", &own(&driver)).0, 400, "who it is is not said in the address");
 }
 
 #[test]
 fn uploads_have_a_limit() {
-    let running = start(frameless_web::Options { upload_bytes: 1000, ..options() });
+    let running = start(Options { upload_bytes: 1000, ..options() });
     let client = Client::connect(&running);
-    let (pass, origin, number) = (running.pass(), running.origin(), client.number);
-    let head = format!("POST /upload?client={number} HTTP/1.1\r\n{pass}Origin: {origin}\r\n");
+    let (pass, origin, token) = (running.pass(), running.origin(), &client.token);
+    let head = format!("POST /upload HTTP/1.1\r\n{pass}Origin: {origin}\r\nX-Client: {token}\r\n");
     let announced = running.ask(format!("{head}Content-Length: 1001\r\n\r\n").as_bytes());
     assert_eq!(announced.status, 413);
     // Without a length: in pieces.
@@ -203,4 +233,46 @@ fn a_recording_comes_while_it_is_made() {
     let head = String::from_utf8_lossy(&bytes[..300]).to_ascii_lowercase();
     assert!(head.starts_with("http/1.1 200") && head.contains("video/mp4"), "{head}");
     assert!(bytes.windows(4).any(|name| name == b"ftyp"));
+}
+
+#[test]
+fn a_recording_goes_on_where_there_is_no_client() {
+    let running = start(Options { rests_after: Duration::from_millis(50), ..options() });
+    std::thread::sleep(Duration::from_millis(500));
+    let mut film = std::net::TcpStream::connect(running.address).unwrap();
+    film.set_read_timeout(Some(PATIENCE)).unwrap();
+    let pass = running.pass();
+    film.write_all(format!("GET /recording.mp4 HTTP/1.1\r\n{pass}\r\n").as_bytes()).unwrap();
+    // Pictures are made while it is: without it there was none, and nobody else has asked for any.
+    let begin = Instant::now();
+    let number = || {
+        let answer = running.get("/picture.png");
+        answer.header("x-picture").and_then(|number| number.parse::<u32>().ok()).unwrap_or(0)
+    };
+    while number() < 10 {
+        assert!(begin.elapsed() < PATIENCE, "{} pictures", number());
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn nothing_is_traced_while_nobody_looks_and_everything_is_there_again_at_once() {
+    let running = start(Options { rests_after: Duration::from_millis(200), ..options() });
+    // The rate is that of the time since the picture before.
+    let status_after = |picture| {
+        Client::connect(&running).until("a status", |_, received| match received {
+            Received::Status(status) => {
+                (status.picture > picture && status.samples_per_sec > 0.0).then_some(*status)
+            }
+            _ => None,
+        })
+    };
+    let before = status_after(20);
+    std::thread::sleep(Duration::from_secs(3));
+    let begin = Instant::now();
+    let after = status_after(before.picture + 1);
+    assert!(begin.elapsed() < Duration::from_secs(5), "{:?}", begin.elapsed());
+    assert!(after.unknown < 0.1, "what was traced has been kept: {}", after.unknown);
+    let [before, after] = [before, after].map(|status| status.samples_per_sec);
+    assert!(after < before / 3.0, "{before} samples/s, then {after} while nobody looked");
 }

@@ -106,7 +106,7 @@ pub(crate) struct Answer {
 
 impl Answer {
     /// Head and, as far as its length is announced or the connection closes, body.
-    fn read(stream: &mut TcpStream, is_head: bool) -> Answer {
+    pub(crate) fn read(stream: &mut TcpStream, is_head: bool) -> Answer {
         let (mut bytes, mut piece) = (Vec::new(), [0; 65536]);
         loop {
             let end = bytes.windows(4).position(|four| four == b"\r\n\r\n");
@@ -163,6 +163,8 @@ pub(crate) struct Client {
     pub(crate) socket: WebSocket<TcpStream>,
     pub(crate) canvas: RgbImage,
     pub(crate) number: u32,
+    /// By which the server recognises it.
+    pub(crate) token: String,
     pub(crate) bytes: usize,
     /// Whether it looks at what it is sent.
     pub(crate) draws: bool,
@@ -176,17 +178,31 @@ pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 impl Client {
     /// Connects, and waits for the welcome.
     pub(crate) fn connect(running: &Running) -> Client {
-        let mut client = Client::try_connect(running).expect("let in");
-        let welcome = client.json("welcome");
-        client.number = welcome["client"].as_u64().expect("a number") as u32;
-        client
+        Client::try_connect(running).expect("let in").welcomed()
+    }
+
+    /// Connects as a page does whose connection was lost.
+    pub(crate) fn resume(running: &Running, token: &str) -> Client {
+        let path = format!("/stream?resume={token}");
+        Client::try_connect_to(running, &path).expect("let in").welcomed()
+    }
+
+    fn welcomed(mut self) -> Client {
+        let welcome = self.json("welcome");
+        self.number = welcome["client"].as_u64().expect("a number") as u32;
+        self.token = welcome["token"].as_str().expect("a token").to_owned();
+        self
     }
 
     /// The status if it is not let in.
     pub(crate) fn try_connect(running: &Running) -> Result<Client, u16> {
+        Client::try_connect_to(running, "/stream")
+    }
+
+    fn try_connect_to(running: &Running, path: &str) -> Result<Client, u16> {
         let port = running.address.port();
         let mut request =
-            format!("ws://localhost:{port}/stream").into_client_request().expect("an address");
+            format!("ws://localhost:{port}{path}").into_client_request().expect("an address");
         let cookie = format!("frameless-{port}={}", running.key);
         request.headers_mut().insert("Cookie", cookie.parse().expect("a header"));
         request.headers_mut().insert("Origin", running.origin().parse().expect("a header"));
@@ -210,7 +226,16 @@ impl Client {
             }
         };
         let canvas = RgbImage::new(1, 1);
-        Ok(Client { socket, canvas, number: 0, bytes: 0, draws: true, generation: 0, sequence: 0 })
+        Ok(Client {
+            socket,
+            canvas,
+            number: 0,
+            token: String::new(),
+            bytes: 0,
+            draws: true,
+            generation: 0,
+            sequence: 0,
+        })
     }
 
     pub(crate) fn say(&mut self, json: &str) {
