@@ -80,8 +80,14 @@ const REFRESH_SECS: f64 = 1.0 / 60.0;
 /// Pictures that nobody has asked for take at most a fifth of the time.
 const COSTS_PER_REFRESH: f64 = 5.0;
 
+/// Starting more takes longer than they save.
+const MOST_REFRESH_THREADS: usize = 8;
+
 impl State {
-    pub(crate) fn new(engine: Engine<Outside>, length: Length) -> State {
+    pub(crate) fn new(mut engine: Engine<Outside>, length: Length) -> State {
+        // Nothing else is done in a session while it makes a picture.
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        engine.set_refresh_threads(cores.min(MOST_REFRESH_THREADS));
         let changes = vec![f32::NAN; engine.canvas().size().pixels()];
         let generation = engine.canvas().generation();
         let refreshes = Refreshes::default();
