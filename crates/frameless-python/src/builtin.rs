@@ -3,14 +3,15 @@
 use std::collections::VecDeque;
 use std::sync::{Mutex, PoisonError};
 
-use frameless::{Canvas, Sampler, SamplerKind, Size, Time};
+use frameless::{Canvas, Request, Sampler, SamplerKind, Size, Time};
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::array;
 use crate::canvas::{PyCanvas, checked};
-use crate::mirror::{self, CanvasView};
+use crate::handed_on;
+use crate::mirror::CanvasView;
 use crate::names::{sampler_kind, whole};
 use crate::observed::Observed;
 use crate::planes;
@@ -39,11 +40,11 @@ struct Learned {
     sampler: Box<dyn Sampler>,
     size: Option<Size>,
     /// Chosen already: `adaptive` chooses one more or less now and then.
-    spare: VecDeque<u32>,
+    spare: VecDeque<Request>,
 }
 
 impl Learned {
-    fn choose(&mut self, now: Time, canvas: &Canvas, count: usize) -> Vec<u32> {
+    fn choose(&mut self, now: Time, canvas: &Canvas, count: usize) -> Vec<Request> {
         let mut requests = Vec::new();
         // It may owe some, but not for ever.
         for _ in 0..MOST_TURNS {
@@ -52,7 +53,7 @@ impl Learned {
                 break;
             }
             self.sampler.choose(now, canvas, missing, &mut requests);
-            self.spare.extend(requests.drain(..).map(|request| request.pixel));
+            self.spare.extend(requests.drain(..));
         }
         self.spare.drain(..count.min(self.spare.len())).collect()
     }
@@ -88,7 +89,7 @@ impl BuiltinSampler {
             return canvas.get().shared.with(py, |state| work(state.engine.canvas()));
         }
         if canvas.is_instance_of::<CanvasView>() {
-            return mirror::with_shown(|canvas| py.detach(|| work(canvas)));
+            return handed_on::with_shown(|canvas| py.detach(|| work(canvas)));
         }
         let came = canvas.get_type().name()?;
         Err(PyTypeError::new_err(format!(
@@ -126,7 +127,13 @@ impl BuiltinSampler {
         let now = checked(now)?;
         let count = whole("count", count, 0..=MOST_PIXELS)? as usize;
         let py = canvas.py();
-        let pixels = self.with(canvas, |learned, canvas| learned.choose(now, canvas, count))?;
+        let (requests, refines) = self.with(canvas, |learned, canvas| {
+            (learned.choose(now, canvas, count), learned.sampler.refines())
+        })?;
+        if canvas.is_instance_of::<CanvasView>() {
+            handed_on::note(&requests, refines);
+        }
+        let pixels = requests.iter().map(|request| request.pixel).collect();
         Ok(array::column(py, pixels))
     }
 

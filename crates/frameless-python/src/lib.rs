@@ -13,6 +13,7 @@ mod camera;
 mod canvas;
 mod columns;
 mod compare;
+mod handed_on;
 mod hits;
 mod interrupt;
 mod invoke;

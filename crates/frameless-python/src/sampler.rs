@@ -8,7 +8,8 @@ use pyo3::prelude::*;
 
 use crate::array;
 use crate::builtin::BuiltinSampler;
-use crate::mirror::{self, CanvasView, Mirror};
+use crate::handed_on::{self, Asked};
+use crate::mirror::{CanvasView, Mirror};
 use crate::names::sampler_kind;
 use crate::observed::Observed;
 use crate::own::Own;
@@ -38,6 +39,7 @@ pub(crate) struct PythonSampler {
     sampler: Own,
     observes: bool,
     tells_probability: bool,
+    refines: bool,
     mirror: RefCell<Option<Mirror>>,
     raised: Raised,
 }
@@ -57,15 +59,16 @@ impl PythonSampler {
         }
         let (observes, tells_probability) =
             (sampler.hasattr("observe")?, sampler.hasattr("probability")?);
-        let mirror = RefCell::default();
-        Ok(PythonSampler { sampler: own, observes, tells_probability, mirror, raised })
+        let (refines, mirror) = (false, RefCell::default());
+        Ok(PythonSampler { sampler: own, observes, tells_probability, refines, mirror, raised })
     }
 
     /// The same object, for another engine.
     pub(crate) fn another(&self) -> PythonSampler {
         let (sampler, raised) = (self.sampler.clone(), self.raised.clone());
         let PythonSampler { observes, tells_probability, .. } = *self;
-        PythonSampler { sampler, observes, tells_probability, mirror: RefCell::default(), raised }
+        let (refines, mirror) = (false, RefCell::default());
+        PythonSampler { sampler, observes, tells_probability, refines, mirror, raised }
     }
 
     /// The canvas as Python sees it.
@@ -79,15 +82,16 @@ impl PythonSampler {
         now: Time,
         canvas: &Canvas,
         count: usize,
-    ) -> PyResult<Vec<i64>> {
+    ) -> PyResult<(Vec<i64>, Asked)> {
         // Gone with the garbage that it was part of.
-        let Some(sampler) = self.sampler.get(py) else { return Ok(Vec::new()) };
+        let Some(sampler) = self.sampler.get(py) else { return Ok(Default::default()) };
         let arguments = (now.secs(), self.view(py, canvas)?, count);
-        let pixels = mirror::showing(canvas, || sampler.call_method1("choose", arguments))?;
-        let pixels = array::integers("choose", &pixels, Some(count))?;
+        let (pixels, asked) =
+            handed_on::showing(canvas, || sampler.call_method1("choose", arguments));
+        let pixels = array::integers("choose", &pixels?, Some(count))?;
         let most = canvas.size().pixels() as i64;
         match pixels.iter().find(|pixel| !(0..most).contains(*pixel)) {
-            None => Ok(pixels),
+            None => Ok((pixels, asked)),
             Some(pixel) => Err(PyValueError::new_err(format!(
                 "choose: wanted pixel numbers from 0 to {}, got {pixel}",
                 most - 1
@@ -103,7 +107,8 @@ impl PythonSampler {
         }
         if self.observes {
             let observed = Observed { samples: samples.to_vec(), size: canvas.size() };
-            mirror::showing(canvas, || sampler.call_method1("observe", (view, observed)))?;
+            let tell = || sampler.call_method1("observe", (view, observed));
+            handed_on::showing(canvas, tell).0?;
         }
         Ok(())
     }
@@ -113,7 +118,8 @@ impl PythonSampler {
             return Ok(Vec::new());
         };
         let arguments = (now.secs(), self.view(py, canvas)?);
-        let known = mirror::showing(canvas, || sampler.call_method1("probability", arguments))?;
+        let ask = || sampler.call_method1("probability", arguments);
+        let known = handed_on::showing(canvas, ask).0?;
         match known.is_none() {
             true => Ok(Vec::new()),
             false => array::probabilities("probability", &known, canvas.size()),
@@ -127,8 +133,9 @@ impl Sampler for PythonSampler {
             return;
         }
         match Python::attach(|py| self.chosen(py, now, canvas, count)) {
-            Ok(pixels) => {
-                requests.extend(pixels.iter().map(|&pixel| Request::centre(pixel as u32)))
+            Ok((pixels, mut asked)) => {
+                self.refines = asked.refines;
+                requests.extend(pixels.iter().map(|&pixel| asked.request(pixel as u32)));
             }
             Err(error) => self.raised.set(error),
         }
@@ -140,6 +147,11 @@ impl Sampler for PythonSampler {
         }
         let told = Python::attach(|py| self.told(py, canvas, observations));
         told.unwrap_or_else(|error| self.raised.set(error));
+    }
+
+    /// As those do that it hands its calls on to.
+    fn refines(&self) -> bool {
+        self.refines
     }
 
     fn inspect(&self, now: Time, canvas: &Canvas) -> Insight {

@@ -44,7 +44,7 @@ pub(crate) struct Served {
 }
 
 /// How long a call of the renderer may take to its end after Ctrl-C before it is left behind.
-const PATIENCE: Duration = Duration::from_millis(300);
+const PATIENCE: Duration = Duration::from_millis(150);
 
 /// A sampler for a page, and the object behind it if it is Python's.
 enum Chooser {
