@@ -53,10 +53,11 @@ def converged(renderer: Renderer, size: tuple[int, int], samples: int) -> Any:
 def frameless_edit(renderer: Renderer, size: tuple[int, int], edit: Callable[[], None], before: float, seconds: float) -> Shown:
     session = frameless.Session(size, camera=CAMERA, noisy=True)
     session.run(renderer, before)
-    begin, shown = time.perf_counter(), []
+    shown: Shown = []
+    begin = time.perf_counter()
     edit()
     for batch in session.batches(seconds):
-        samples = renderer(batch.x, batch.y, batch.time, batch.camera, batch.seed)
+        samples = renderer(batch.x, batch.y, batch.time, batch.camera or CAMERA, batch.seed)
         batch.submit(samples.rgb, position=samples.position, object_id=samples.object_id)
         if not shown or time.perf_counter() - begin - shown[-1][0] > 1 / 30:
             shown.append((time.perf_counter() - begin, session.image()))

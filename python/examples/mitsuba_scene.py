@@ -59,10 +59,10 @@ class Seeded(mi.Sampler):  # type: ignore[misc]
 
     def __init__(self, props: Any) -> None:
         super().__init__(props)
-        self.rng = mi.PCG32()
+        self.rng: Any = mi.PCG32()  # type: ignore[operator]
 
     def seed_each(self, seeds: Any) -> None:
-        self.rng = mi.PCG32(initstate=mi.UInt64(seeds), initseq=mi.UInt64(seeds) + 1)
+        self.rng = mi.PCG32(initstate=mi.UInt64(seeds), initseq=mi.UInt64(seeds) + 1)  # type: ignore[operator]
 
     def next_1d(self, active: Any = True) -> Any:
         return self.rng.next_float32(active)

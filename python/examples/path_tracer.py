@@ -67,11 +67,11 @@ def from_lamp(p, normal, u, v):
 def render(x, y, time, camera, seed):
     colour = np.array([[9.0, 8.0, 6.0], [3.0, 6.0, 9.0]])[int(time / 4.0) % 2]
     o, d = (a.astype(float) for a in camera.rays(x, y))
-    weight, first = np.ones((len(x), 3)), None
+    weight = np.ones((len(x), 3))
     for bounce in range(BOUNCES):
         u, v, w, s = (random(seed, 4 * bounce + i) for i in range(4))
         p, normal, albedo, which = nearest(o, d)
-        if first is None:
+        if bounce == 0:
             first = p, normal, which
             rgb = is_lamp(p, which)[:, None] * colour
         weight *= albedo * ((which >= 0) & ~is_lamp(p, which))[:, None]

@@ -13,7 +13,7 @@ def distance(p, time):
     """How far the nearest surface is, and whether that is the floor."""
     near = np.full(len(p), 1e-20, np.float32)
     for i, speed in enumerate((1.0, 1.3, 0.7)):
-        to = p - np.float32([1.4 * np.sin(speed * time), 0.6 + 0.5 * i, 0.9 * i - 0.9])
+        to = p - np.array([1.4 * np.sin(speed * time), 0.6 + 0.5 * i, 0.9 * i - 0.9], np.float32)
         near += np.exp(3.6 - 6.0 * np.sqrt(np.einsum("ij,ij->i", to, to)))
     blob = -np.log(near) / np.float32(6.0)
     return np.minimum(blob, p[:, 1]), p[:, 1] < blob
@@ -36,7 +36,7 @@ def render(x, y, time, camera):
     here, is_floor = distance(p, time)
     normal = np.stack([distance(p + step, time)[0] - here for step in np.eye(3, dtype=np.float32) / 200], axis=1)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True) + 1e-12
-    lamp = np.float32([4.0 * np.cos(0.5 * time), 5.0, 4.0 * np.sin(0.5 * time)]) - p
+    lamp = np.array([4.0 * np.cos(0.5 * time), 5.0, 4.0 * np.sin(0.5 * time)], np.float32) - p
     away = np.linalg.norm(lamp, axis=1, keepdims=True)
     lit = march(p + 0.01 * normal, lamp / away, time, 16) > 0.9 * away[:, 0]
     light = 0.05 + 25.0 * (lit * np.maximum(np.sum(normal * lamp, axis=1), 0.0)) / away[:, 0] ** 3

@@ -29,7 +29,7 @@ from ._frameless import (
     __version__,
 )
 from . import metrics, plot, testing
-from .experiment import compare, compare_file
+from .experiment import Row, compare, compare_file
 from .png import save_png
 from .samples import Samples
 from .sampling import CanvasLike, Sampler
@@ -44,6 +44,7 @@ __all__ = [
     "CanvasLike",
     "CanvasView",
     "Observed",
+    "Row",
     "Sampler",
     "Samples",
     "Scene",

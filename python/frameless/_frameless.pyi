@@ -1,5 +1,7 @@
 """The compiled half; what each thing does is in its docstring."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator, Sequence
 from os import PathLike
 from types import TracebackType
@@ -9,9 +11,9 @@ from typing_extensions import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from .experiment import Row
-from .samples import Samples
-from .sampling import Sampler
+from frameless.experiment import Row
+from frameless.samples import Samples
+from frameless.sampling import CanvasLike, Sampler
 
 __all__ = [
     "Batch",
@@ -213,10 +215,10 @@ class BuiltinSampler:
     def __new__(cls, name: str, seed: int = 1) -> Self: ...
     @property
     def name(self) -> str: ...
-    # Only the package's own canvas holds what the built-in samplers look at.
-    def choose(self, now: float, canvas: Any, count: int) -> NDArray[np.uint32]: ...
-    def observe(self, canvas: Canvas, observed: Observed) -> None: ...
-    def probability(self, now: float, canvas: Canvas) -> _Floats32 | None: ...
+    # The package's own canvases only: others lack what the built-in samplers look at.
+    def choose(self, now: float, canvas: CanvasLike, count: int) -> NDArray[np.uint32]: ...
+    def observe(self, canvas: CanvasLike, observed: Observed) -> None: ...
+    def probability(self, now: float, canvas: CanvasLike) -> _Floats32 | None: ...
 
 @final
 class Scene:
@@ -263,7 +265,7 @@ def start_serving(
     render: Callable[..., Any],
     size: tuple[int, int],
     camera: Camera,
-    sampler: str,
+    sampler: str | BuiltinSampler | Sampler,
     reconstruction: str,
     batch_ms: float,
     budget: float | None,

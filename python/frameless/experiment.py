@@ -1,9 +1,11 @@
 """Comparisons on the simulated clock: every algorithm against the picture of an ideal renderer that takes no time."""
 
 import json
-from collections.abc import Callable, Sequence
+import math
+import operator
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any, TypedDict, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,29 +13,32 @@ from numpy.typing import NDArray
 from ._frameless import run_experiment
 from .sampling import Sampler
 
-Row = TypedDict(
-    "Row",
-    {
-        "scene": str,
-        "algorithm": str,
-        "samples_per_sec": float,
-        "seed": int,
-        "width": int,
-        "height": int,
-        "display_hz": int,
-        "rmse": float,
-        "rmse_p95": float,
-        "rmse_changed": float,
-        "psnr_db": float,
-        "ssim": float,
-        "flip": float,
-        "age_secs": float,
-        "oldest_secs": float,
-        "rmse_over_time": NDArray[np.float64],
-    },
-)
-"""One run. Means over the scored refreshes; NaN where something was not measured. ``pandas.DataFrame(rows)`` takes a list of
-them."""
+class Row(TypedDict):
+    """One run. Means over the scored refreshes; NaN where something was not measured. ``pandas.DataFrame(rows)`` takes a list of
+    them."""
+
+    scene: str
+    algorithm: str
+    samples_per_sec: float
+    seed: int
+    width: int
+    height: int
+    display_hz: int
+    rmse: float
+    """Root mean squared error over all pixels and channels, display-referred sRGB in [0, 1]."""
+    rmse_p95: float
+    """95th percentile of the refreshes' RMSE."""
+    rmse_changed: float
+    """RMSE of the pixels that changed in the last 100 ms, alone."""
+    psnr_db: float
+    ssim: float
+    flip: float
+    age_secs: float
+    """Mean age of what pixels show."""
+    oldest_secs: float
+    rmse_over_time: NDArray[np.float64]
+    """RMSE at every refresh, unscored ones included."""
+
 
 Algorithm = str | tuple[str, Callable[[int], Sampler]]
 """A name, or a name of your own and what makes a sampler of a seed."""
@@ -71,32 +76,34 @@ def compare(
 
     Returns a list of dicts, one per run; see Row. The same arguments give the same numbers.
 
-    Raises ValueError for what makes no sense; what a sampler of your own raises arrives as it is. Ctrl-C ends it at once.
+    Raises ValueError for what makes no sense, TypeError for what is no number, name or factory; what a sampler of your own raises arrives as it is. Ctrl-C ends it at once.
     """
-    given_scenes = [scenes] if isinstance(scenes, (str, Path)) else list(scenes)
-    rates = [samples_per_sec] if isinstance(samples_per_sec, (int, float)) else list(samples_per_sec)
-    named = [algorithm for algorithm in algorithms if isinstance(algorithm, str)]
-    custom = [algorithm for algorithm in algorithms if not isinstance(algorithm, str)]
-    if not algorithms:
-        raise ValueError("algorithms: wanted at least one algorithm, got none")
-    width, height = size
+    width, height = _pair("size", size)
+    if isinstance(algorithms, str):
+        raise TypeError(f"algorithms: wanted a list of names and pairs, got {algorithms!r}; write [{algorithms!r}]")
+    named, custom = _split(list(algorithms))
     lines = [
         'title = "compare"',
         # A file names at least one algorithm.
         f"algorithms = {_toml(named or ['random'])}",
-        f"samples_per_sec = {_toml([float(rate) for rate in rates])}",
-        f"seeds = {_toml([int(seed) for seed in seeds])}",
-        f"width = {_toml(int(width))}",
-        f"height = {_toml(int(height))}",
-        f"display_hz = {_toml(int(display_hz))}",
-        f"duration_secs = {_toml(float(seconds))}",
-        f"unscored_secs = {_toml(float(unscored))}",
+        f"samples_per_sec = {_toml(_several('samples_per_sec', samples_per_sec, _positive))}",
+        f"seeds = {_toml(_several('seeds', seeds, _whole))}",
+        f"width = {width}",
+        f"height = {height}",
+        f"display_hz = {_whole('display_hz', display_hz, least=1)}",
+        f"duration_secs = {_toml(_positive('seconds', seconds))}",
+        f"unscored_secs = {_toml(_number('unscored', unscored))}",
     ]
-    for scene in given_scenes:
-        lines += ["[[scenes]]", f"scene = {_toml(str(scene))}"]
-    lines += ["[metrics]", f"ssim_every = {_toml(int(ssim_every))}", f"flip_every = {_toml(int(flip_every))}"]
-    lines += ["[output]", "video = false"]
-    return _run("\n".join(lines), Path.cwd(), bool(named), custom)
+    for scene in _several("scenes", scenes, _scene):
+        lines += ["[[scenes]]", f"scene = {_toml(scene)}"]
+    lines += [
+        "[metrics]",
+        f"ssim_every = {_whole('ssim_every', ssim_every)}",
+        f"flip_every = {_whole('flip_every', flip_every)}",
+        "[output]",
+        "video = false",
+    ]
+    return run_experiment("\n".join(lines), str(Path.cwd()), bool(named), custom)
 
 
 def compare_file(path: str | Path) -> list[Row]:
@@ -105,19 +112,86 @@ def compare_file(path: str | Path) -> list[Row]:
     Raises OSError if the file cannot be read, ValueError if it is not what it should be.
     """
     path = Path(path)
-    return _run(path.read_text(encoding="utf-8"), path.parent, True, [])
+    return run_experiment(path.read_text(encoding="utf-8"), str(path.parent), True, [])
 
 
-def _run(
-    text: str, folder: Path, with_named: bool, custom: Sequence[tuple[str, Callable[[int], Sampler]]]
-) -> list[Row]:
-    split = []
-    for name, factory in custom:
+_Custom = tuple[str, str, Callable[[int], Sampler]]
+"""A name, how samples are shown, and what makes a sampler of a seed."""
+
+
+def _split(algorithms: list[Algorithm]) -> tuple[list[str], list[_Custom]]:
+    """Those that have a name only, and the others."""
+    if not algorithms:
+        raise ValueError("algorithms: wanted at least one algorithm, got none")
+    named: list[str] = []
+    custom: list[_Custom] = []
+    for algorithm in algorithms:
+        if isinstance(algorithm, str):
+            named.append(algorithm)
+            continue
+        if not isinstance(algorithm, tuple) or len(algorithm) != 2 or not isinstance(algorithm[0], str):
+            raise TypeError(f"algorithms: wanted names and pairs of a name and a factory, got {algorithm!r}")
+        name, factory = algorithm
         if not callable(factory):
             raise TypeError(f"algorithm {name!r}: wanted what makes a sampler of a seed, got {factory!r}")
-        shown = name.partition("+")[2] or "hold"
-        split.append((name, shown, factory))
-    return run_experiment(text, str(folder), with_named, split)
+        custom.append((name, name.partition("+")[2] or "hold", factory))
+    return named, custom
+
+
+_T = TypeVar("_T")
+
+
+def _several(name: str, given: Any, check: Callable[[str, Any], _T]) -> list[_T]:
+    """One or a sequence of them, each checked."""
+    if isinstance(given, (str, Path)) or not isinstance(given, Iterable):
+        return [check(name, given)]
+    several = [check(name, one) for one in given]
+    if not several:
+        raise ValueError(f"{name}: wanted at least one, got none")
+    return several
+
+
+def _scene(name: str, given: Any) -> str:
+    if not isinstance(given, (str, Path)):
+        raise TypeError(f"{name}: wanted names or paths, got {given!r}")
+    scene = str(given)
+    if not scene.isprintable():
+        raise ValueError(f"{name}: wanted a name or path of printable characters, got {scene!r}")
+    return scene
+
+
+def _whole(name: str, given: Any, least: int = 0) -> int:
+    try:
+        number = operator.index(given)
+    except TypeError:
+        raise TypeError(f"{name}: wanted a whole number, got {given!r}") from None
+    if not least <= number < 2**63:
+        raise ValueError(f"{name}: wanted a whole number of at least {least}, got {number}")
+    return number
+
+
+def _number(name: str, given: Any) -> float:
+    try:
+        number = float(given)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: wanted a number, got {given!r}") from None
+    if not 0.0 <= number < math.inf:
+        raise ValueError(f"{name}: wanted a finite number of at least 0, got {number}")
+    return number
+
+
+def _positive(name: str, given: Any) -> float:
+    if (number := _number(name, given)) == 0.0:
+        raise ValueError(f"{name}: wanted a number above 0, got {number}")
+    return number
+
+
+def _pair(name: str, given: Any) -> tuple[int, int]:
+    try:
+        width, height = given
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: wanted (width, height) in pixels, got {given!r}") from None
+    return _whole(f"{name}: width", width, least=1), _whole(f"{name}: height", height, least=1)
 
 
 def _toml(value: Any) -> str:

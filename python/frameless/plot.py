@@ -37,7 +37,8 @@ def error_over_time(rows: Sequence[Row], ax: "Axes | None" = None) -> "Axes":
         ax.plot(seconds, errors, label=_label(row, rows), linewidth=1.2)
     ax.set(xlabel="time (s)", ylabel="RMSE against the ideal (sRGB)", yscale="log")
     ax.grid(True, which="both", alpha=0.2)
-    ax.legend(fontsize="small")
+    if rows:
+        ax.legend(fontsize="small")
     return ax
 
 

@@ -15,8 +15,10 @@ def save_png(path: str | Path, image: NDArray[Any]) -> None:
 
     ``image``: display-referred sRGB, shape (height, width, 3), floats in [0, 1] (what lies outside is clamped) or uint8.
 
-    Raises ValueError for another shape or dtype, or NaN.
+    Raises ValueError for another shape or dtype, or NaN, TypeError for what is no array.
     """
+    if not isinstance(image, np.ndarray):
+        raise TypeError(f"image: wanted a numpy array, got {type(image).__name__}")
     if image.ndim != 3 or image.shape[2] != 3 or image.size == 0:
         raise ValueError(f"image: wanted shape (height, width, 3), got {image.shape}")
     if image.dtype.kind == "f":

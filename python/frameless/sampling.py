@@ -37,7 +37,11 @@ class Sampler(Protocol):
     A class with this method is a sampler, and is accepted wherever a name is: by ``Session``, by ``compare``, and by
     ``frameless.testing.check_sampler``. It may also have a method ``observe(canvas, observed)``, which is called with what became
     of samples once they are on the canvas, in a fixed order. Between choosing and observing any number of other batches may have
-    been chosen, and some samples are never observed. Both are called by one thread at a time.
+    been chosen, and some samples are never observed: those that are added to others of a pixel at rest, since they say nothing of change.
+    Both are called by one thread at a time. A method ``probability(now, canvas)`` may return what ``Session.probability`` is to tell:
+    shape (height, width), sum 1.
+
+    ``canvas`` may be handed on to a :class:`BuiltinSampler`, whose choices the sampler then changes.
 
     The same calls must give the same choices: make all randomness from a seed given at construction.
     """

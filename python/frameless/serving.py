@@ -4,14 +4,13 @@ import atexit
 from collections.abc import Callable
 from typing import Any
 
-from ._frameless import Camera, Served, start_serving
+from ._frameless import BuiltinSampler, Camera, Served, start_serving
+from .sampling import Sampler
 
 DEFAULT_CAMERA = Camera(eye=(0.0, 0.0, 5.0), target=(0.0, 0.0, 0.0))
 
 Render = Callable[..., Any]
-"""``render(x, y, time, camera)``: x and y are float32 arrays of shape (n,), pixels from the picture's top-left corner; time is in
-seconds; ``camera.rays(x, y)`` are the rays through them. Returns linear RGB of shape (n, 3), or Samples. With ``noisy`` it is called
-with ``seed``, too: uint32 of shape (n,)."""
+"""See :func:`serve`."""
 
 _served: list[Served] = []
 """All that have been started. Kept, so that who forgets a page can still be stopped at exit: its thread calls into the interpreter."""
@@ -22,7 +21,7 @@ def serve(
     size: tuple[int, int] = (640, 480),
     *,
     camera: Camera = DEFAULT_CAMERA,
-    sampler: str = "adaptive",
+    sampler: str | BuiltinSampler | Sampler = "adaptive",
     reconstruction: str = "reproject+antialias",
     batch_ms: float = 4.0,
     budget: float | None = None,
@@ -35,19 +34,22 @@ def serve(
 
     Parameters:
 
-    - `render`: see frameless.serving.Render; called in a thread of its own, with the interpreter held, about every `batch_ms`
+    - `render`: a function `render(x, y, time, camera)`, called in a thread of its own, with the interpreter held, about every `batch_ms`.
+        x and y are float32 arrays of shape (n,), pixels from the picture's top-left corner; time is in seconds; `camera.rays(x, y)` are the rays
+        through them. It returns linear RGB of shape (n, 3), or Samples
     - `size`: (width, height) of the picture in pixels
     - `camera`: from where it is looked at first; dragging on the page moves it
-    - `sampler`, `reconstruction`: by name, as in Session
+    - `sampler`, `reconstruction`: as in Session. On the page another may be chosen; a sampler that is no name is there called `own`
     - `batch_ms`: milliseconds that a call of `render` should take; longer if calls are expensive
     - `budget`: samples per second at most
-    - `exposure`: stops by which radiance is multiplied before it is shown
-    - `noisy`: whether colours have noise; render is then called with seeds
+    - `exposure`: stops (powers of two), from -64 to 64, by which radiance is multiplied before it is shown
+    - `noisy`: whether colours have noise; it is then called as `render(x, y, time, camera, seed)`, seed being uint32 of shape (n,), and
+        makes its random numbers from that alone
     - `port`: where the page listens, on this machine only; default: any free port
     - `allow_frame`: origin of the pages that may show this one inside them, as notebooks do. Default: those that are reached under the
         name localhost, at any port. A notebook opened as 127.0.0.1 or elsewhere shows no page inline; open `url` then
 
-    Raises OSError if the port is taken, ValueError for values that make no sense.
+    Raises OSError if the port is taken, ValueError for values that make no sense, TypeError for what is no function or no sampler.
     """
     _served[:] = [page for page in _served if page.running]
     served = start_serving(
@@ -86,11 +88,11 @@ def view(
 
         webbrowser.open(served.url)
     try:
+        # Ctrl-C, and what render raises, have stopped the page when they arrive here.
         served.wait()
     except KeyboardInterrupt:
-        pass
-    finally:
-        served.stop()
+        return
+    served.stop()
 
 
 @atexit.register
@@ -98,6 +100,6 @@ def _stop_all() -> None:
     for served in list(_served):
         try:
             served.stop()
-        except Exception:
+        except BaseException:
             # Nobody is left to be told.
             continue

@@ -83,7 +83,7 @@ def test_wrong_arrays_are_refused_with_what_was_wanted_and_what_came(rgb: Any, s
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e300])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.filterwarnings("ignore:overflow")
-def test_values_that_are_not_finite_are_named_with_their_sample(value: float, dtype: type) -> None:
+def test_values_that_are_not_finite_are_named_with_their_sample(value: float, dtype: Any) -> None:
     rgb = RGB.astype(dtype)
     rgb[17, 1] = value
     asked = batch()

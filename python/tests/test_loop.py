@@ -1,6 +1,8 @@
 """The explicit loop: whole, late, partial and lost answers, errors, size, time."""
 
 import threading
+import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,7 +43,7 @@ def test_places_are_pixels_from_the_corner(session: frameless.Session) -> None:
     assert len(batch) == 100 == len(batch.x) == len(batch.seed)
     assert np.array_equal(batch.x, columns + 0.5) and np.array_equal(batch.y, rows + 0.5)
     assert batch.size == session.size == (40, 30)
-    assert (batch.x.dtype, batch.pixel.dtype, batch.sample_index.dtype) == (np.float32, np.uint32, np.uint32)
+    assert [a.dtype.name for a in (batch.x, batch.pixel, batch.sample_index)] == ["float32", "uint32", "uint32"]
 
 
 def test_late_partial_and_out_of_order_answers() -> None:
@@ -148,6 +150,47 @@ def test_a_budget_is_kept() -> None:
     assert session.budget is None and session.run(pattern, 0.2) > kept
 
 
+def test_a_budget_does_not_starve_calls_that_take_long() -> None:
+    def slow(x: Any, *_: object) -> Any:
+        time.sleep(0.02)
+        return np.zeros((len(x), 3))
+
+    session = frameless.Session((200, 150), budget=50_000.0)
+    session.run(slow, 0.5)
+    begin, before = session.now, session.counters["kept"]
+    session.run(slow, 1.0)
+    per_second = (session.counters["kept"] - before) / (session.now - begin)
+    assert 25_000 < per_second <= 52_000
+
+
+def test_nobody_is_asked_for_nothing() -> None:
+    counts = []
+
+    class Asked:
+        def choose(self, now: float, canvas: frameless.CanvasLike, count: int) -> Any:
+            counts.append(count)
+            return np.zeros(count, int)
+
+    session = frameless.Session((40, 30), sampler=Asked(), simulated=100.0)
+    session.run(pattern, 0.3)
+    assert min(counts) > 0 and session.counters["batches"] == len(counts)
+
+
+@pytest.mark.parametrize(
+    ("out", "error", "says"),
+    [
+        (np.empty((30, 40, 3)), ValueError, "wanted dtype float32, got float64"),
+        (np.empty((30, 40), np.float32), ValueError, r"wanted shape \(30, 40, 3\), got \(30, 40\)"),
+        (np.broadcast_to(np.float32(0), (30, 40, 3)), ValueError, "may be written"),
+        (np.empty((30, 40), [("rgb", "<f4", 3), ("flag", "u1")])["rgb"], ValueError, "packed"),
+        ([1.0], TypeError, "wanted a numpy array, got list"),
+    ],
+)
+def test_what_no_picture_fits_into_is_refused(session: frameless.Session, out: Any, error: Any, says: str) -> None:
+    with pytest.raises(error, match=says):
+        session.image(out=out)
+
+
 def test_planes_say_what_happened() -> None:
     session = frameless.Session((40, 30), sampler="permutation", reconstruction="hold", simulated=12_000.0)
     assert np.isinf(session.age()).all() and np.isnan(session.change()).all() and not session.known().any()
@@ -187,7 +230,7 @@ def test_arrays_handed_out_do_not_change() -> None:
 
 
 def test_wrong_out_is_refused(session: frameless.Session) -> None:
-    with pytest.raises(ValueError, match=r"out: wanted shape \[30, 40, 3\], got \[40, 30, 3\]"):
+    with pytest.raises(ValueError, match=r"out: wanted shape \(30, 40, 3\), got \(40, 30, 3\)"):
         session.image(out=np.empty((40, 30, 3), np.float32))
 
 
@@ -241,7 +284,14 @@ def test_simulated_clocks_repeat_and_refuse_what_contradicts_them() -> None:
         ({"sampler": "chance"}, "chance"),
         ({"sampler": "adaptive(temporal=7)"}, "[0, 1]"),
         ({"reconstruction": "bogus"}, "bogus"),
-        ({"batch": 0}, "from 1"),
+        ({"batch": 0}, "batch: wanted a whole number from 1"),
+        ({"batch": -1}, "got -1"),
+        ({"seed": -1}, "seed: wanted a whole number from 0"),
+        ({"seed": 2**64}, "seed"),
+        ({"sampler": "framed"}, "sampler: wanted one of random, permutation, change, adaptive; got"),
+        ({"sampler": "change+filter"}, "sampler: wanted one of"),
+        ({"sampler": "change(tile=0)"}, "tile at least 1"),
+        ({"exposure": 65.0}, "from -64 to 64 stops"),
         ({"batch_ms": float("nan")}, "batch_ms"),
         ({"budget": -1.0}, "budget"),
         ({"simulated": 0.0}, "simulated"),

@@ -1,5 +1,7 @@
 """Scenes, metrics, comparisons, plots, pictures as files."""
 
+import copy
+import pickle
 import struct
 import zlib
 from pathlib import Path
@@ -148,7 +150,16 @@ def test_compare_measures_what_is_asked_for() -> None:
         ({"scenes": "nowhere"}, "nowhere"),
         ({"algorithms": [("mine+bogus", object)]}, "bogus"),
         ({"samples_per_sec": -1}, "samples_per_sec"),
-        ({"size": (0, 4)}, "width"),
+        ({"size": (0, 4)}, "size: width: wanted a whole number of at least 1, got 0"),
+        ({"samples_per_sec": float("nan")}, "samples_per_sec: wanted a finite number"),
+        ({"samples_per_sec": 1e300}, "at most"),
+        ({"samples_per_sec": 0.0}, "samples_per_sec: wanted a number above 0"),
+        ({"seconds": float("inf")}, "seconds: wanted a finite number"),
+        ({"seeds": (-1,)}, "seeds: wanted a whole number of at least 0, got -1"),
+        ({"seeds": ()}, "seeds: wanted at least one"),
+        ({"scenes": []}, "scenes: wanted at least one"),
+        ({"scenes": "a\x7fb.glb"}, "printable"),
+        ({"scenes": "a\udc80b.glb"}, "printable"),
     ],
 )
 def test_compare_refuses_nonsense(arguments: dict[str, Any], says: str) -> None:
@@ -157,9 +168,37 @@ def test_compare_refuses_nonsense(arguments: dict[str, Any], says: str) -> None:
     assert says in str(refused.value)
 
 
-def test_factories_must_be_callable() -> None:
-    with pytest.raises(TypeError, match="wanted what makes a sampler"):
-        compare(algorithms=[("mine", 7)])  # type: ignore[list-item]
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ({"algorithms": [("mine", 7)]}, "wanted what makes a sampler"),
+        ({"algorithms": [("mine", object, 1)]}, "wanted names and pairs"),
+        ({"algorithms": "change"}, r"write \['change'\]"),
+        ({"size": (32.5, 24)}, "size: width: wanted a whole number, got 32.5"),
+        ({"size": 32}, r"size: wanted \(width, height\)"),
+        ({"display_hz": 59.9}, "display_hz: wanted a whole number"),
+        ({"samples_per_sec": "fast"}, "samples_per_sec: wanted a number"),
+        ({"scenes": 7}, "scenes: wanted names or paths"),
+    ],
+)
+def test_what_is_none_of_it_is_a_type_error(arguments: dict[str, Any], says: str) -> None:
+    with pytest.raises(TypeError, match=says):
+        compare(**{"seconds": 0.6, **arguments})
+
+
+def test_numbers_may_be_numpys() -> None:
+    rate: Any = np.int64(9000)
+    seeds: Any = np.arange(1, 2)
+    (row,) = compare("sphere", ["random"], samples_per_sec=rate, size=tuple(np.array([32, 24])), seconds=0.6, seeds=seeds)
+    assert row["width"] == 32 and row["samples_per_sec"] == 9000.0
+
+
+def test_a_camera_can_be_copied_and_sent() -> None:
+    camera = frameless.Camera((1, 2, 5), (0.1, 0, 0), up=(0, 0, 1), fov=30).with_size((64, 48))
+    for other in (pickle.loads(pickle.dumps(camera)), copy.copy(camera), copy.deepcopy(camera)):
+        assert other == camera and other.size == (64, 48) and np.array_equal(other.matrix(), camera.matrix())
+    parallel = Scene.builtin("sphere").camera()
+    assert pickle.loads(pickle.dumps(parallel)) == parallel
 
 
 def test_experiments_in_files_run(tmp_path: Path) -> None:
@@ -187,9 +226,10 @@ def test_plots_show_the_numbers() -> None:
         (plot.age(session.age()), session.age()),
         (plot.probability(session.tile_probability()), session.tile_probability()),
     ]:
-        shown = drawn.get_images()[0].get_array()
-        assert np.allclose(np.ma.filled(shown, np.inf)[session.known()], values[session.known()])  # type: ignore[index]
-    plot.change(session.change()).figure.draw_without_rendering()
+        shown: Any = drawn.get_images()[0].get_array()
+        assert values is not None and np.allclose(np.ma.filled(shown, np.inf)[session.known()], values[session.known()])
+    figure: Any = plot.change(session.change()).figure
+    figure.draw_without_rendering()
     assert plot.picture(session.image(), title="now").get_title() == "now"
     with pytest.raises(ValueError, match="does not know"):
         plot.probability(None)

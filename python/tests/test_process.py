@@ -1,16 +1,20 @@
 """What concerns the whole process: threads, Ctrl-C, memory, the time that an import takes."""
 
 import base64
+import gc
 import os
 import signal
 import subprocess
 import sys
 import threading
 import time
+import weakref
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import frameless
 from conftest import pattern
@@ -55,10 +59,12 @@ def test_threads_may_share_a_session() -> None:
         assert session.probability() is not None
 
     threads = [threading.Thread(target=guarded, args=[work]) for work in (trace, trace, trace, look, steer)]
-    [thread.start() for thread in threads]
+    for thread in threads:
+        thread.start()
     time.sleep(1.0)
     stop.set()
-    [thread.join(10.0) for thread in threads]
+    for thread in threads:
+        thread.join(10.0)
     assert not errors and not any(thread.is_alive() for thread in threads), errors
     counters = session.counters
     assert counters["kept"] > 1_000 and session.known().all()
@@ -80,8 +86,10 @@ def test_parts_of_a_batch_from_many_threads_are_kept_once() -> None:
                 refused.append(start)
 
     threads = [threading.Thread(target=answer, args=[first]) for first in (0, 500, 1_000, 1_500)]
-    [thread.start() for thread in threads]
-    [thread.join() for thread in threads]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
     assert session.counters["kept"] == 3_000 and len(refused) == 4 * 15 - 30
 
 
@@ -112,6 +120,14 @@ LONG = {
     "run": "frameless.Session((64, 48)).run(lambda x, y, t, c: numpy.zeros((len(x), 3)))",
     "render": "frameless.Scene.builtin('many').render((8000, 8000))",
     "wait": "frameless.serve(lambda x, y, t, c: numpy.zeros((len(x), 3)), (32, 24), port=0).wait()",
+    "waiting for a long call": "frameless.serve(lambda x, y, t, c: time.sleep(9), (32, 24)).wait()",
+    "stopping in a long call": "page = frameless.serve(lambda x, y, t, c: time.sleep(9), (32, 24)); time.sleep(0.3); page.stop()",
+    "many places": (
+        "scene = frameless.Scene.builtin('many'); x = numpy.full(20_000_000, 9.0, numpy.float32); "
+        "scene(x, x, 0.0, scene.camera().with_size((640, 480)))"
+    ),
+    "a large picture": "session = frameless.Session((8000, 4000)); [session.image() for _ in range(99)]",
+    "the first batch of a large picture": "[list(frameless.Session((8000, 8000)).batches(0.1)) for _ in range(99)]",
 }
 
 
@@ -134,6 +150,48 @@ def test_ctrl_c_stops_within_half_a_second(what: str) -> None:
         process.send_signal(signal.SIGINT)
         word, _, at = process.stdout.readline().partition(" ")
         assert word == "stopped" and float(at) - sent < 0.5
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for single processes")
+def test_after_ctrl_c_nothing_keeps_the_program_alive() -> None:
+    code = (
+        "import signal, time, frameless\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "print('ready', flush=True)\n"
+        "frameless.view(lambda x, y, t, c: time.sleep(20), (32, 24), open_browser=False)\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None and process.stdout.readline() == "ready\n"
+        assert "look at it here" in process.stdout.readline()
+        time.sleep(0.5)
+        sent = time.time()
+        process.send_signal(signal.SIGINT)
+        assert process.wait(15.0) == 0 and time.time() - sent < 2.0
+
+
+def test_samplers_that_know_their_session_are_collected() -> None:
+    class Knowing:
+        def choose(self, now: float, canvas: frameless.CanvasLike, count: int) -> NDArray[Any]:
+            return np.arange(count) % canvas.time.size
+
+    def ring() -> list[weakref.ref[Any]]:
+        one, other, of_page = Knowing(), Knowing(), Knowing()
+        session = frameless.Session((8, 6), sampler=one, batch=10)
+        one.session, other.batches = session, iter(session)  # type: ignore[attr-defined]
+        batch = next(iter(session))
+        session.set_sampler(other)
+        one.session = None  # type: ignore[attr-defined]
+        page = frameless.serve(lambda x, y, t, c: pattern(x, y, t, (c, page)[0]), (8, 6), sampler=of_page)
+        of_page.page = page  # type: ignore[attr-defined]
+        page.stop()
+        assert batch.submit(np.zeros((10, 3))) == 10
+        return [weakref.ref(one), weakref.ref(other), weakref.ref(of_page), weakref.ref(page)]
+
+    known = ring()
+    frameless.serve(pattern, (8, 6)).stop()
+    frameless.serve(pattern, (8, 6)).stop()
+    gc.collect()
+    assert [ref() for ref in known] == [None] * 4
 
 
 TRIANGLE = """{

@@ -124,6 +124,41 @@ def test_what_the_renderer_raises_arrives_and_another_goes_on() -> None:
         served.stop()
 
 
+def test_a_failure_that_nobody_waits_for_is_written_down(capfd: pytest.CaptureFixture[str]) -> None:
+    def broken(*_: object) -> Any:
+        raise LookupError("no lamp")
+
+    served = serve(broken, (32, 24))
+    wait_for(lambda: served.failed)
+    time.sleep(0.1)
+    said = capfd.readouterr().err
+    assert "LookupError: no lamp" in said and "in broken" in said and "page.set_render" in said
+    assert said.count("Traceback") == 1, "once"
+    with pytest.raises(LookupError):
+        served.stop()
+
+
+def test_a_page_takes_samplers_of_all_kinds(capfd: pytest.CaptureFixture[str]) -> None:
+    asked = []
+
+    class Rows:
+        def choose(self, now: float, canvas: frameless.CanvasLike, count: int) -> Any:
+            asked.append(count)
+            if len(asked) > 50:
+                raise LookupError("no more rows")
+            return np.arange(count) % canvas.time.size
+
+    for sampler in ("change", frameless.BuiltinSampler("random", 3)):
+        calls: list[int] = []
+        served = serve(lambda x, *_, calls=calls: (calls.append(1), np.zeros((len(x), 3)))[1], (32, 24), sampler=sampler)
+        wait_for(lambda calls=calls: len(calls) > 10)
+        served.stop()
+    served = serve(lambda x, *_: np.zeros((len(x), 3)), (32, 24), sampler=Rows())
+    with pytest.raises(LookupError, match="no more rows"):
+        served.wait(10.0)
+    assert len(asked) > 50 and not served.running
+
+
 def test_waiting_ends_in_time() -> None:
     served = serve(pattern, (32, 24))
     begin = time.perf_counter()
@@ -148,19 +183,29 @@ def test_view_raises_what_render_raises(monkeypatch: pytest.MonkeyPatch, capsys:
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ({"render": 7}, "render: wanted a function"),
         ({"size": (0, 1)}, "at least 1"),
         ({"sampler": "chance"}, "chance"),
         ({"reconstruction": "bogus"}, "bogus"),
         ({"batch_ms": 0.0}, "batch_ms"),
         ({"budget": -1.0}, "budget"),
         ({"exposure": float("nan")}, "exposure"),
+        ({"exposure": 65.0}, "from -64 to 64 stops, got 65"),
+        ({"port": 70_000}, "port: wanted a whole number from 0 to 65535"),
+        ({"port": -1}, "port"),
     ],
 )
 def test_nonsense_is_refused(arguments: dict[str, Any], says: str) -> None:
     with pytest.raises(ValueError) as refused:
         serve(**{"render": pattern, "size": (32, 24), **arguments})
     assert says in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"), [({"render": 7}, "render: wanted a function"), ({"sampler": 7}, "sampler: wanted a name or")]
+)
+def test_what_is_none_is_refused(arguments: dict[str, Any], says: str) -> None:
+    with pytest.raises(TypeError, match=says):
+        serve(**{"render": pattern, "size": (32, 24), **arguments})
 
 
 def test_a_port_that_is_taken_is_said() -> None:

@@ -67,7 +67,11 @@ fn build(out: &Path) -> Result<Done> {
         out.read_dir()?.map(|entry| Ok(entry?.path())).collect::<Result<_>>()?;
     let [wheel] = wheels.as_slice() else { bail!("wanted one wheel, got {wheels:?}") };
     let name = wheel.file_name().unwrap_or_default().to_string_lossy();
-    ensure!(name.starts_with("frameless-"), "wanted a wheel named frameless-…, got {name}");
+    let is_named = name.starts_with("frameless-") && name.contains("-cp310-abi3-");
+    ensure!(is_named, "wanted a wheel named frameless-…-cp310-abi3-…, got {name}");
+    // Whether the compiled half keeps to what its tag promises.
+    let mut audit = python();
+    said(audit.args(["-m", "abi3audit", "--strict"]).arg(wheel), CHECKS_WITHIN)?;
     let mut pip = python();
     pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
     pip.args(["--force-reinstall", "--no-deps"]).arg(wheel);
@@ -87,11 +91,18 @@ fn tests() -> Result<Done> {
     Ok(Done { skipped: skipped_by_pytest(&text), ..Done::passed("") })
 }
 
-/// mypy (strict) on the package, and the compiled half against its stub.
+/// mypy on the package and its tests (strict) and on the examples, and the compiled half against its stub.
 fn types() -> Result<Done> {
     let mut mypy = python();
     mypy.current_dir(in_project("python")).args(["-m", "mypy"]);
     let text = said(&mut mypy, CHECKS_WITHIN)?;
+    for (folder, how) in
+        [("tests", "--strict"), ("docs", "--strict"), ("examples", "--check-untyped-defs")]
+    {
+        let mut mypy = python();
+        mypy.current_dir(in_project("python").join(folder));
+        said(mypy.args(["-m", "mypy", "--config-file=", how, "."]), CHECKS_WITHIN)?;
+    }
     let mut stubtest = python();
     stubtest.current_dir(in_project("python/tests"));
     stubtest.args(["-m", "mypy.stubtest", "frameless", "--concise"]);
@@ -103,13 +114,22 @@ fn types() -> Result<Done> {
 fn reference(out: &Path) -> Result<Done> {
     let mut pdoc = python();
     pdoc.current_dir(in_project("python/tests"));
-    pdoc.args(["-m", "pdoc", "--docformat", "markdown", "--output-directory"]).arg(out);
-    pdoc.args(["frameless", "!frameless._frameless", "!frameless.bench"]);
-    said(&mut pdoc, CHECKS_WITHIN)?;
-    let page = std::fs::read_to_string(out.join("frameless.html"))?;
-    for name in ["Session", "Batch", "Sampler", "compare", "view"] {
-        ensure!(page.contains(&format!("id=\"{name}\"")), "the reference does not know {name}");
+    said(pdoc.arg("../docs/reference.py").arg(out), CHECKS_WITHIN)?;
+    let pages: [(&str, &[&str]); 3] = [
+        ("frameless.html", &["Session", "Batch.submit", "Sampler", "compare", "view", "Row.rmse"]),
+        ("frameless/plot.html", &["error_over_time"]),
+        ("frameless/testing.html", &["check_sampler"]),
+    ];
+    for (file, names) in pages {
+        let page = std::fs::read_to_string(out.join(file))?;
+        for name in names {
+            let anchor = format!("id=\"{name}\"");
+            ensure!(page.contains(&anchor), "the reference does not know {name}");
+        }
     }
+    let page = std::fs::read_to_string(out.join("frameless.html"))?;
+    let is_explained = page.contains("Session(size, *, sampler=None") && page.contains("budget");
+    ensure!(is_explained, "the reference does not say how a Session is made");
     Ok(Done::passed(format!("{}/index.html", out.display())))
 }
 

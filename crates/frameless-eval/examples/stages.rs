@@ -252,6 +252,10 @@ impl Sampler for Spy {
         self.sampler.observe(canvas, observations);
     }
 
+    fn refines(&self) -> bool {
+        self.sampler.refines()
+    }
+
     fn rates(&self) -> Option<&Rates> {
         self.sampler.rates()
     }

@@ -64,16 +64,11 @@ impl Algorithm {
             )
         };
         let (sampler, reconstruction) = split_reconstruction(name).ok_or_else(unknown)?;
-        let (head, parameters) = match sampler.split_once('(') {
-            Some((head, rest)) => (head, Some(rest)),
-            None => (sampler, None),
-        };
-        let kind = SamplerKind::from_name(head).ok_or_else(unknown)?;
-        let kind = match parameters {
-            None => kind,
-            Some(text) => with_parameters(kind, name, text)?,
-        };
-        Ok(Algorithm::Frameless(kind, reconstruction))
+        let kind = with_brackets(sampler).ok_or_else(unknown)?;
+        Ok(Algorithm::Frameless(
+            kind.map_err(|wrong| format!("algorithm {name:?}: {wrong}"))?,
+            reconstruction,
+        ))
     }
 
     /// The name that [`Algorithm::from_name`] understands.
@@ -139,6 +134,26 @@ impl Algorithm {
     }
 }
 
+/// A sampler by its name in those of algorithms, with its parameters: `change(w_d=0.7,tile=8)`.
+///
+/// # Errors
+/// What was wanted, if there is no such sampler.
+pub fn sampler_from_name(name: &str) -> Result<SamplerKind, String> {
+    let unknown = || {
+        let known = SamplerKind::ALL.map(|kind| kind.name()).join(", ");
+        format!("wanted one of {known}; got {name:?}")
+    };
+    with_brackets(name).ok_or_else(unknown)?.map_err(|wrong| format!("{wrong}; got {name:?}"))
+}
+
+/// `None` if there is no sampler of that name.
+fn with_brackets(name: &str) -> Option<Result<SamplerKind, String>> {
+    match name.split_once('(') {
+        None => SamplerKind::from_name(name).map(Ok),
+        Some((head, rest)) => Some(with_parameters(SamplerKind::from_name(head)?, rest)),
+    }
+}
+
 /// The sampler's name with its parameters, and how its samples are shown; `None` if there is no such reconstruction.
 fn split_reconstruction(name: &str) -> Option<(&str, ReconstructionKind)> {
     match name.split_once('+') {
@@ -176,13 +191,13 @@ fn adaptive_parameters(options: &AdaptiveOptions) -> [(&'static str, f32); 4] {
 }
 
 /// `text` is what stands behind the opening bracket.
-fn with_parameters(kind: SamplerKind, name: &str, text: &str) -> Result<SamplerKind, String> {
+fn with_parameters(kind: SamplerKind, text: &str) -> Result<SamplerKind, String> {
     let example = match kind {
         SamplerKind::Change { .. } => "change(w_d=0.9,tile=16)",
         SamplerKind::Adaptive { .. } => "adaptive(temporal=0.5) or adaptive(without=fronts)",
-        _ => return Err(format!("algorithm {name:?}: {} has no parameters", kind.name())),
+        _ => return Err(format!("{} has no parameters", kind.name())),
     };
-    let wrong = || format!("algorithm {name:?}: wanted {example}");
+    let wrong = || format!("wanted {example}");
     let mut kind = kind;
     for parameter in text.strip_suffix(')').ok_or_else(wrong)?.split(',') {
         let (key, value) = parameter.split_once('=').ok_or_else(wrong)?;
@@ -212,14 +227,14 @@ fn with_parameters(kind: SamplerKind, name: &str, text: &str) -> Result<SamplerK
     }
     match kind {
         SamplerKind::Change { w_d, tile } if !(0.0..=1.0).contains(&w_d) || tile == 0 => {
-            Err(format!("algorithm {name:?}: w_d must be in [0, 1] and tile at least 1"))
+            Err("w_d must be in [0, 1] and tile at least 1".to_owned())
         }
         SamplerKind::Adaptive(AdaptiveOptions { temporal, contrast, flow, gaze, .. }) => {
             let is_part = [temporal, gaze].iter().all(|part| (0.0..=1.0).contains(part));
             let is_strength = [contrast, flow].iter().all(|s| (-1.0..=1.0).contains(s));
             let ranges = "temporal and gaze must be in [0, 1], contrast and flow in [-1, 1]";
             let is_valid = is_part && is_strength;
-            is_valid.then_some(kind).ok_or_else(|| format!("algorithm {name:?}: {ranges}"))
+            is_valid.then_some(kind).ok_or_else(|| ranges.to_owned())
         }
         kind => Ok(kind),
     }

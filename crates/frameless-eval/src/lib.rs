@@ -25,7 +25,7 @@ mod script;
 mod selection;
 mod subject;
 
-pub use algorithm::Algorithm;
+pub use algorithm::{Algorithm, sampler_from_name};
 pub use camera_path::CameraPath;
 pub use experiment::{
     Action, EqualQualitySpec, EventSpec, Experiment, Goal, IDEAL, MetricsSpec, Mover, SceneSource,

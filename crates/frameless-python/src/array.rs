@@ -37,7 +37,7 @@ fn array<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUn
 
 /// Whether elements lie at multiples of their size from each other, and where the processor wants them. The field of a packed
 /// structured array may not, and is then no array to Rust.
-pub(crate) fn is_regular(array: &Bound<'_, PyUntypedArray>) -> PyResult<bool> {
+fn is_regular(array: &Bound<'_, PyUntypedArray>) -> PyResult<bool> {
     let bytes = array.dtype().itemsize().max(1) as isize;
     let is_aligned: bool = array.getattr("flags")?.getattr("aligned")?.extract()?;
     Ok(is_aligned && array.strides().iter().all(|stride| stride % bytes == 0))
@@ -207,6 +207,71 @@ pub(crate) fn integers(
     let wide = array.call_method1("astype", ("int64",))?;
     let wide = wide.extract::<PyReadonlyArray1<'_, i64>>()?;
     Ok(wide.as_array().iter().copied().collect())
+}
+
+/// Row-major pixel numbers of a picture: shape (n,).
+pub(crate) fn pixels(name: &str, value: &Bound<'_, PyAny>, size: Size) -> PyResult<Vec<u32>> {
+    let most = size.pixels() as i64;
+    let within = |(i, pixel): (usize, i64)| match (0..most).contains(&pixel) {
+        true => Ok(pixel as u32),
+        false => Err(PyValueError::new_err(format!(
+            "{name}: wanted numbers from 0 to {}, got {pixel} at index {i}",
+            most - 1
+        ))),
+    };
+    integers(name, value, None)?.into_iter().enumerate().map(within).collect()
+}
+
+/// One probability per pixel: shape (height, width), at least 0, sum 1.
+pub(crate) fn probabilities(
+    name: &str,
+    value: &Bound<'_, PyAny>,
+    size: Size,
+) -> PyResult<Vec<f32>> {
+    let array = array(name, value)?;
+    let wanted = [size.height as usize, size.width as usize];
+    if array.shape() != wanted {
+        return Err(wrong_shape(name, &wanted, &array));
+    }
+    let values = floats(name, &array.call_method1("reshape", (size.pixels(),))?)?;
+    let sum: f64 = values.iter().map(|&value| f64::from(value)).sum();
+    if values.iter().any(|&value| value < 0.0) || (sum - 1.0).abs() > 1e-3 {
+        return Err(PyValueError::new_err(format!(
+            "{name}: wanted numbers of at least 0 whose sum is 1, got a sum of {sum} and a least of {}",
+            values.iter().copied().fold(f32::INFINITY, f32::min)
+        )));
+    }
+    Ok(values)
+}
+
+/// An array to write a picture into: float32 of shape (height, width, 3), in any regular memory order.
+pub(crate) fn target<'py>(
+    name: &str,
+    value: &Bound<'py, PyAny>,
+    size: Size,
+) -> PyResult<Bound<'py, PyArray3<f32>>> {
+    let Ok(array) = value.cast::<PyUntypedArray>() else {
+        let came = value.get_type().name()?;
+        return Err(PyTypeError::new_err(format!("{name}: wanted a numpy array, got {came}")));
+    };
+    let wanted = [size.height as usize, size.width as usize, 3];
+    if array.shape() != wanted {
+        return Err(wrong_shape(name, &wanted, array));
+    }
+    if !is::<f32>(array) {
+        return Err(wrong_dtype(name, "float32", array));
+    }
+    if !is_regular(array)? {
+        return Err(PyValueError::new_err(format!(
+            "{name}: wanted an array whose elements lie at multiples of their size, got a field of a packed structured one"
+        )));
+    }
+    let may_be_written: bool = array.getattr("flags")?.getattr("writeable")?.extract()?;
+    if !may_be_written {
+        let message = format!("{name}: wanted an array that may be written, got a read-only one");
+        return Err(PyValueError::new_err(message));
+    }
+    Ok(array.clone().cast_into()?)
 }
 
 /// Which samples of `n`: numbers from 0, or a mask of `n` truth values.

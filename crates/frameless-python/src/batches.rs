@@ -2,6 +2,7 @@
 
 use frameless::Time;
 use pyo3::prelude::*;
+use pyo3::{PyTraverseError, PyVisit};
 
 use crate::batch::Batch;
 use crate::session::Session;
@@ -24,6 +25,10 @@ impl Batches {
 impl Batches {
     fn __iter__(slf: Bound<'_, Batches>) -> Bound<'_, Batches> {
         slf
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.session)
     }
 
     fn __next__(&self, py: Python<'_>) -> PyResult<Option<Batch>> {

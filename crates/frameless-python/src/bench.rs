@@ -3,8 +3,8 @@
 use frameless::{Answer, Clock, Engine, Time};
 use pyo3::prelude::*;
 
+use crate::names::{reconstruction_kind, sampler_kind};
 use crate::outside::Outside;
-use crate::sampler::named;
 use crate::shared::{Length, State};
 use crate::size::PictureSize;
 
@@ -18,7 +18,7 @@ pub(crate) fn loop_without_python(
     batch: usize,
     seconds: f64,
 ) -> PyResult<(u64, f64)> {
-    let (sampler, reconstruction) = named(sampler, reconstruction)?;
+    let (sampler, reconstruction) = (sampler_kind(sampler)?, reconstruction_kind(reconstruction)?);
     let outside = Outside::new(None, false);
     let mut engine = Engine::new(size.0, Clock::real(), sampler.build(1), outside);
     engine.set_reconstruction(reconstruction.build());

@@ -16,6 +16,9 @@ type Triple = [f32; 3];
 /// Origins and directions.
 type Rays<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>);
 
+/// All that a camera is: columns of its matrix, half angle or half height, distance, upwards and size.
+type Restored = ([f32; 12], Option<f32>, Option<f32>, (f32, Triple, Option<(u32, u32)>));
+
 /// A pinhole camera that looks at `target` from `eye`; immutable.
 ///
 /// Parameters:
@@ -181,6 +184,31 @@ impl Camera {
             rays.unzip::<_, _, Vec<_>, Vec<_>>()
         });
         Ok((array::rows(py, origins)?, array::rows(py, directions)?))
+    }
+
+    /// What pickle and copy need to make the same again.
+    fn __reduce__<'py>(slf: &Bound<'py, Camera>) -> PyResult<(Bound<'py, PyAny>, (Restored,))> {
+        let camera = slf.get();
+        let (fov_rad, height) = match camera.view.projection {
+            Projection::Perspective { yfov_rad } => (Some(yfov_rad), None),
+            Projection::Orthographic { ymag } => (None, Some(ymag)),
+        };
+        let matrix = camera.view.world_from_camera.to_cols_array();
+        let rest = (camera.distance, camera.up.to_array(), camera.size());
+        Ok((slf.get_type().getattr("_restored")?, ((matrix, fov_rad, height, rest),)))
+    }
+
+    #[staticmethod]
+    fn _restored(state: Restored) -> PyResult<Camera> {
+        let (matrix, fov_rad, height, (distance, up, size)) = state;
+        let projection = match (fov_rad, height) {
+            (Some(yfov_rad), None) => Projection::Perspective { yfov_rad },
+            (None, Some(ymag)) => Projection::Orthographic { ymag },
+            _ => return Err(PyValueError::new_err("this is no camera's state")),
+        };
+        let view = View { world_from_camera: Affine3A::from_cols_array(&matrix), projection };
+        let size = size.map(|(width, height)| Size::new(width, height));
+        Ok(Camera { view, distance, up: up.into(), size })
     }
 
     fn __repr__(&self) -> String {

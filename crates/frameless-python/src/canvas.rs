@@ -10,10 +10,11 @@ use pyo3::prelude::*;
 use crate::array;
 use crate::camera::Camera;
 use crate::hits::Arrays;
+use crate::names::reconstruction_kind;
 use crate::observed::Observed;
 use crate::outside::Outside;
 use crate::planes;
-use crate::sampler::{Nobody, named, on_canvas};
+use crate::sampler::Nobody;
 use crate::shared::{Length, Raised, Shared, State};
 use crate::size::{PictureSize, pair};
 
@@ -28,10 +29,10 @@ use crate::size::{PictureSize, pair};
 /// Raises ValueError if there is no such reconstruction.
 #[pyclass(frozen, name = "Canvas", module = "frameless")]
 pub(crate) struct PyCanvas {
-    pub(crate) shared: Shared,
+    pub(crate) shared: Arc<Shared>,
 }
 
-fn checked(now: f64) -> PyResult<Time> {
+pub(crate) fn checked(now: f64) -> PyResult<Time> {
     match now.is_finite() && now >= 0.0 {
         true => Ok(Time::from_secs(now)),
         false => Err(PyValueError::new_err(format!("now: wanted seconds, at least 0, got {now}"))),
@@ -43,13 +44,13 @@ impl PyCanvas {
     #[new]
     #[pyo3(signature = (size, *, reconstruction="hold", camera=None))]
     fn new(size: PictureSize, reconstruction: &str, camera: Option<Camera>) -> PyResult<PyCanvas> {
-        let (_, reconstruction) = named("random", reconstruction)?;
+        let reconstruction = reconstruction_kind(reconstruction)?;
         let outside = Outside::new(camera, false);
         // The clock is never asked: whoever holds the canvas says what time it is.
         let mut engine = Engine::new(size.0, Clock::simulated(1.0), Box::new(Nobody), outside);
         engine.set_reconstruction(reconstruction.build());
         let state = State::new(engine, Length::Fixed(0));
-        Ok(PyCanvas { shared: Shared::new(state, Raised::default()) })
+        Ok(PyCanvas { shared: Arc::new(Shared::new(state, Raised::default())) })
     }
 
     /// (width, height) in pixels.
@@ -125,7 +126,7 @@ impl PyCanvas {
             let outside = state.engine.tracer();
             (state.engine.canvas().size(), outside.camera, Arc::clone(&outside.transforms))
         })?;
-        let pixels = on_canvas(array::integers("pixel", pixel, None)?, size)?;
+        let pixels = array::pixels("pixel", pixel, size)?;
         let arrays = Arrays { rgb, position, normal, object_id };
         let at = |i: usize| format!("sample {i} (pixel {})", pixels[i]);
         let (rgb, hits) = arrays.checked(pixels.len(), &at)?;
@@ -148,7 +149,7 @@ impl PyCanvas {
             state.note_changes();
             PyResult::Ok(state.engine.observations().to_vec())
         })??;
-        Ok(Observed { samples })
+        Ok(Observed { samples, size })
     }
 
     /// The picture at `now` (seconds): display-referred sRGB in [0, 1], float32, shape (height, width, 3).
@@ -159,7 +160,7 @@ impl PyCanvas {
         &self,
         py: Python<'py>,
         now: f64,
-        out: Option<Bound<'py, PyArray3<f32>>>,
+        out: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArray3<f32>>> {
         planes::image(py, &self.shared, Some(checked(now)?), out)
     }

@@ -117,7 +117,7 @@ fn customs(
         PyValueError::new_err(format!("algorithm {name:?}: there is no reconstruction {shown:?}"))
     })?;
     let plan = |&seed: &u64| {
-        let sampler = from_python(&factory.call1((seed,))?, seed, raised)?;
+        let (sampler, _) = from_python(&factory.call1((seed,))?, seed, raised)?;
         let cell = cell(scene, algorithm.clone(), rate, seed);
         Ok(Planned { name: name.to_owned(), cell, sampler: Some(sampler) })
     };

@@ -7,6 +7,8 @@ mod array;
 mod batch;
 mod batches;
 mod bench;
+mod builtin;
+mod calls;
 mod camera;
 mod canvas;
 mod columns;
@@ -16,8 +18,10 @@ mod interrupt;
 mod invoke;
 mod metrics;
 mod mirror;
+mod names;
 mod observed;
 mod outside;
+mod own;
 mod planes;
 mod sampler;
 mod scene;
@@ -32,6 +36,8 @@ use pyo3::prelude::*;
 /// The compiled half of the package frameless.
 #[pymodule(gil_used = false)]
 fn _frameless(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    // numpy's own functions are looked up here and not in the middle of something: Ctrl-C during the look-up would be a panic.
+    numpy::PyArray1::<f32>::zeros(module.py(), [0], false);
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<camera::Camera>()?;
     module.add_class::<session::Session>()?;
@@ -40,7 +46,7 @@ fn _frameless(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<canvas::PyCanvas>()?;
     module.add_class::<mirror::CanvasView>()?;
     module.add_class::<observed::Observed>()?;
-    module.add_class::<sampler::BuiltinSampler>()?;
+    module.add_class::<builtin::BuiltinSampler>()?;
     module.add_class::<scene::Scene>()?;
     module.add_class::<serve::Served>()?;
     module.add_function(wrap_pyfunction!(serve::start_serving, module)?)?;

@@ -25,8 +25,9 @@ fn pair(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<(Colours, Colour
 /// - `a`, `b`: shape (height, width, 3), display-referred sRGB in [0, 1]
 #[pyfunction]
 pub(crate) fn rmse(a: &Bound<'_, PyAny>, b: &Bound<'_, PyAny>) -> PyResult<f64> {
+    let py = a.py();
     let (a, b, _) = pair(a, b)?;
-    Ok(frameless_eval::rmse(&a, &b))
+    Ok(py.detach(|| frameless_eval::rmse(&a, &b)))
 }
 
 /// Peak signal-to-noise ratio of two pictures in dB, -20 log10(RMSE); infinite if they are equal.

@@ -3,7 +3,9 @@
 use frameless::{Canvas, Observation, Time};
 use numpy::prelude::*;
 use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use scoped_tls::scoped_thread_local;
 
 use crate::array;
 
@@ -48,6 +50,27 @@ impl CanvasView {
     fn holes<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         self.holes.bind(py).clone()
     }
+}
+
+scoped_thread_local!(static SHOWN: Canvas);
+
+/// While `call` runs in this thread, built-in samplers that are handed a [`CanvasView`] see this canvas.
+pub(crate) fn showing<R>(canvas: &Canvas, call: impl FnOnce() -> R) -> R {
+    SHOWN.set(canvas, call)
+}
+
+/// The canvas that a sampler written in Python is looking at.
+///
+/// # Errors
+/// If none is, in this thread.
+pub(crate) fn with_shown<R>(work: impl FnOnce(&Canvas) -> R) -> PyResult<R> {
+    if !SHOWN.is_set() {
+        return Err(PyValueError::new_err(
+            "canvas: a sampler's canvas is there only while the sampler chooses or observes, and in that thread; for other times \
+             there is Canvas",
+        ));
+    }
+    Ok(SHOWN.with(work))
 }
 
 /// A canvas kept in numpy's memory as well: after a batch only the pixels traced are written.

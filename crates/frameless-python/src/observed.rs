@@ -1,6 +1,6 @@
 //! What became of samples, as samplers are told.
 
-use frameless::Observation;
+use frameless::{Observation, Size};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 
@@ -10,6 +10,8 @@ use crate::array;
 #[pyclass(frozen, module = "frameless")]
 pub(crate) struct Observed {
     pub(crate) samples: Vec<Observation>,
+    /// Of the canvas that they are on.
+    pub(crate) size: Size,
 }
 
 impl Observed {

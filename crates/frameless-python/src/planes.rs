@@ -1,9 +1,10 @@
 //! What is known of every pixel, as arrays. All are the caller's own: nothing changes them later.
 
+use std::sync::Arc;
+
 use frameless::{Size, Time};
 use numpy::prelude::*;
 use numpy::{PyArray2, PyArray3};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::array;
@@ -12,24 +13,18 @@ use crate::shared::Shared;
 /// The picture at `now`, or at the engine's own time.
 pub(crate) fn image<'py>(
     py: Python<'py>,
-    shared: &Shared,
+    shared: &Arc<Shared>,
     now: Option<Time>,
-    out: Option<Bound<'py, PyArray3<f32>>>,
+    out: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyArray3<f32>>> {
-    let (size, picture) = shared.with(py, |state| {
+    let checked = |size: Size| out.as_ref().map(|out| array::target("out", out, size)).transpose();
+    // Before the work, and again after it: somebody may have changed the size meanwhile.
+    checked(shared.with(py, |state| state.engine.canvas().size())?)?;
+    let (size, picture) = shared.with_long(py, move |state| {
         let now = now.unwrap_or_else(|| state.engine.now());
         (state.engine.canvas().size(), state.picture(now, Vec::new()))
     })?;
-    let Some(out) = out else { return array::colours(py, size, picture) };
-    let wanted = [size.height as usize, size.width as usize, 3];
-    if out.shape() != wanted {
-        let message = format!("out: wanted shape {wanted:?}, got {:?}", out.shape());
-        return Err(PyValueError::new_err(message));
-    }
-    if !array::is_regular(out.as_untyped())? {
-        let message = "out: wanted an array whose elements lie at multiples of their size, got a field of a packed structured one";
-        return Err(PyValueError::new_err(message));
-    }
+    let Some(out) = checked(size)? else { return array::colours(py, size, picture) };
     let mut target = out.try_readwrite()?;
     let flat = picture.into_flattened();
     let in_order = target.is_c_contiguous();

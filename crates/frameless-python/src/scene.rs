@@ -3,18 +3,19 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use frameless::{Answer, Batch, Pose, Request, Size, Surface, Time, Tracer};
-use frameless_scene::{BUILTIN_NAMES, Limits, State, View, builtin, load};
+use frameless::{Batch, Pose, Request, Size, Surface, Time, Tracer};
+use frameless_scene::{BUILTIN_NAMES, Limits, State, builtin, load};
 use frameless_trace::{CpuTracer, Ray, Settings, ViewSource, World, render, thread_pool};
 use glam::{Mat4, Vec3A};
 use numpy::PyArray3;
 use numpy::prelude::*;
-use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::exceptions::{PyOSError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::array;
 use crate::camera::Camera;
 use crate::interrupt::interruptible;
+use crate::names::whole;
 use crate::size::PictureSize;
 
 /// A scene that changes with time, and the renderer for it: direct light, hard shadows, mirrors, on all cores.
@@ -24,12 +25,12 @@ use crate::size::PictureSize;
 pub(crate) struct Scene {
     world: Arc<World>,
     /// Made when first used.
-    tracer: OnceLock<Mutex<CpuTracer>>,
+    tracer: Arc<OnceLock<Mutex<CpuTracer>>>,
 }
 
 impl Scene {
     fn of(scene: frameless_scene::Scene) -> Scene {
-        Scene { world: Arc::new(World::new(Arc::new(scene))), tracer: OnceLock::new() }
+        Scene { world: Arc::new(World::new(Arc::new(scene))), tracer: Arc::default() }
     }
 
     fn scene(&self) -> &Arc<frameless_scene::Scene> {
@@ -43,41 +44,63 @@ impl Scene {
         }
     }
 
-    fn checked_camera(&self, camera: usize) -> PyResult<u32> {
-        let cameras = self.scene().cameras.len();
-        match camera < cameras {
-            true => Ok(camera as u32),
-            false => Err(PyValueError::new_err(format!(
-                "camera: wanted a number from 0 to {}, got {camera}",
-                cameras - 1
-            ))),
-        }
+    fn checked_camera(&self, camera: i128) -> PyResult<u32> {
+        whole("camera", camera, 0..=self.scene().cameras.len() as u32 - 1)
     }
 
-    /// All samples at one time, in the order of their places.
-    fn answer(
-        &self,
-        places: Vec<[f32; 2]>,
-        secs: f64,
-        view: View,
-        size: Size,
-    ) -> Option<(Answer, Pose)> {
-        let tracer =
-            || CpuTracer::new(self.world.clone(), ViewSource::Free(view), Settings::default(), 0);
-        let mut tracer = self
-            .tracer
-            .get_or_init(|| Mutex::new(tracer()))
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        tracer.set_view(ViewSource::Free(view));
-        let requests = places.into_iter().map(|place| request(place, size)).collect();
-        tracer.submit(Batch { id: 0, now: Time::ZERO, scene_secs: secs, size, requests });
-        let answer = tracer.collect(true)?;
-        let mut pose = Pose::default();
-        tracer.pose(secs, size, &mut pose);
-        Some((answer, pose))
+    /// What traces places at one time, with or without the interpreter.
+    fn asked(&self, places: Vec<[f32; 2]>, secs: f64, camera: Camera, size: Size) -> Asked {
+        let (world, tracer) = (Arc::clone(&self.world), Arc::clone(&self.tracer));
+        Asked { world, tracer, places, secs, camera, size }
     }
 }
+
+/// Places in a picture that are to be traced at one time.
+struct Asked {
+    world: Arc<World>,
+    tracer: Arc<OnceLock<Mutex<CpuTracer>>>,
+    places: Vec<[f32; 2]>,
+    secs: f64,
+    camera: Camera,
+    size: Size,
+}
+
+/// Colours, positions, normals and object numbers, one per place.
+type Traced = (Vec<[f32; 3]>, Vec<[f32; 3]>, Vec<[f32; 3]>, Vec<i64>);
+
+impl Asked {
+    /// In the order of the places. `None` if the tracer has no answer, which it always has.
+    fn trace(self) -> Option<Traced> {
+        let Asked { world, tracer, places, secs, camera, size } = self;
+        let view = *camera.view();
+        let new = || CpuTracer::new(world.clone(), ViewSource::Free(view), Settings::default(), 0);
+        let tracer = tracer.get_or_init(|| Mutex::new(new()));
+        let mut pose = Pose::default();
+        let answer = {
+            let mut tracer = tracer.lock().unwrap_or_else(PoisonError::into_inner);
+            tracer.set_view(ViewSource::Free(view));
+            let requests = places.into_iter().map(|place| request(place, size)).collect();
+            tracer.submit(Batch { id: 0, now: Time::ZERO, scene_secs: secs, size, requests });
+            let answer = tracer.collect(true)?;
+            tracer.pose(secs, size, &mut pose);
+            answer
+        };
+        let state = world.scene().state_at(secs);
+        let (optics, forward) = (camera.optics(size), -view.world_from_camera.matrix3.z_axis);
+        let hits = answer.requests.iter().zip(&answer.surfaces).map(|(request, surface)| {
+            in_world(surface, &pose, &optics.ray(request), forward, &state, world.scene())
+        });
+        let (position, normal) = hits.unzip();
+        let object = answer.surfaces.iter().map(|surface| match surface.object {
+            Surface::SKY => -1,
+            object => i64::from(object),
+        });
+        Some((answer.rgb, position, normal, object.collect()))
+    }
+}
+
+/// Places that take longer than one would wait for Ctrl-C.
+const MANY_PLACES: usize = 1 << 16;
 
 /// The request whose ray goes through a place; beside the picture the border pixel's, with a larger offset.
 fn request([x, y]: [f32; 2], size: Size) -> Request {
@@ -168,7 +191,7 @@ impl Scene {
 
     /// One of the scene's cameras as it is at a time (seconds).
     #[pyo3(signature = (index=0, time=0.0))]
-    fn camera(&self, index: usize, time: f64) -> PyResult<Camera> {
+    fn camera(&self, index: i128, time: f64) -> PyResult<Camera> {
         let (index, secs) = (self.checked_camera(index)?, Scene::checked_secs(time)?);
         let view = self.scene().view_at(&self.scene().state_at(secs), index);
         Ok(Camera::from_view(view, 1.0))
@@ -203,7 +226,14 @@ impl Scene {
             None => ViewSource::Camera(0),
             Some(camera) => match camera.extract::<Camera>() {
                 Ok(camera) => ViewSource::Free(*camera.view()),
-                Err(_) => ViewSource::Camera(self.checked_camera(camera.extract()?)?),
+                Err(_) => match camera.extract::<i128>() {
+                    Ok(number) => ViewSource::Camera(self.checked_camera(number)?),
+                    Err(_) => {
+                        let came = camera.repr()?;
+                        let message = format!("camera: wanted a Camera or a number, got {came}");
+                        return Err(PyTypeError::new_err(message));
+                    }
+                },
             },
         };
         let (world, size) = (self.world.clone(), size.0);
@@ -239,26 +269,18 @@ impl Scene {
             let message = "camera: wanted one that knows its picture's size, as batches' do; use camera.with_size";
             return Err(PyValueError::new_err(message));
         };
-        let places = x.into_iter().zip(y).map(|(x, y)| [x, y]).collect();
-        let size = Size::new(width, height);
-        let answer = py.detach(|| self.answer(places, secs, *camera.view(), size));
-        let (answer, pose) =
-            answer.ok_or_else(|| PyValueError::new_err("the tracer gave no answer"))?;
-        let state = self.scene().state_at(secs);
-        let (optics, forward) =
-            (camera.optics(size), -camera.view().world_from_camera.matrix3.z_axis);
-        let hits = answer.requests.iter().zip(&answer.surfaces).map(|(request, surface)| {
-            in_world(surface, &pose, &optics.ray(request), forward, &state, self.scene())
-        });
-        let (position, normal): (Vec<_>, Vec<_>) = hits.unzip();
-        let object = answer.surfaces.iter().map(|surface| match surface.object {
-            Surface::SKY => -1,
-            object => i64::from(object),
-        });
-        let object: Vec<i64> = object.collect();
+        let places: Vec<_> = x.into_iter().zip(y).map(|(x, y)| [x, y]).collect();
+        let is_long = places.len() >= MANY_PLACES;
+        let asked = self.asked(places, secs, camera, Size::new(width, height));
+        let traced = match is_long {
+            true => interruptible(py, move |_| asked.trace())?,
+            false => py.detach(|| asked.trace()),
+        };
+        let (rgb, position, normal, object) =
+            traced.ok_or_else(|| PyValueError::new_err("the tracer gave no answer"))?;
         let samples = py.import("frameless.samples")?.getattr("Samples")?;
         samples.call1((
-            array::rows(py, answer.rgb)?,
+            array::rows(py, rgb)?,
             array::rows(py, position)?,
             array::rows(py, normal)?,
             array::column(py, object),

@@ -1,83 +1,74 @@
 //! A renderer in Python on a web page.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use frameless::{Clock, ReconstructionKind, SamplerKind};
-use frameless_session::{Helm, PictureSize as Shown, Session, Settings};
+use frameless::{Clock, SamplerKind};
+use frameless_session::{Helm, LOOP_THREAD, OwnSampler, PictureSize as Shown, Session, Settings};
 use frameless_web::{Options, Server, Show, Stopper};
-use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyOSError, PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
+use pyo3::{PyTraverseError, PyVisit};
 
+use crate::builtin::BuiltinSampler;
+use crate::calls::Calls;
 use crate::camera::Camera;
 use crate::interrupt::LOOK_EVERY;
-use crate::sampler::named;
+use crate::names::{positive, reconstruction_kind, sampler_kind, stops, whole};
+use crate::own::Own;
+use crate::sampler::PythonSampler;
 use crate::shared::Raised;
 use crate::size::PictureSize;
-use crate::stage::{PythonStage, Render};
+use crate::stage::PythonStage;
 
 /// A page that shows a renderer while it works; made by `frameless.serve`. In a notebook, the last line of a cell shows it inline.
 ///
-/// What the renderer raises stops the picture; `wait`, `stop` and `check` raise it as it is, and after that, or with `set_render`, the
-/// picture goes on.
+/// What the renderer raises stops the picture, and is said on the page; `wait`, `stop` and `check` raise it as it is, and after that, or
+/// with `set_render`, the picture goes on. If nobody waits for it, it is written to stderr, too.
 #[pyclass(frozen, weakref, module = "frameless")]
 pub(crate) struct Served {
     url: String,
     size: (u32, u32),
-    render: Render,
+    render: Own,
+    sampler: Option<Own>,
     raised: Raised,
+    calls: Calls,
     stopper: Stopper,
+    /// Ctrl-C has ended the waiting for its end: nobody waits for long again.
+    given_up: AtomicBool,
     /// Until it has been waited for.
     thread: Mutex<Option<JoinHandle<anyhow::Result<()>>>>,
 }
 
-/// What is told of where to listen.
-pub(crate) struct Where {
-    pub(crate) port: u16,
-    pub(crate) allow_frame: Option<String>,
+/// How long a call of the renderer may take to its end after Ctrl-C before it is left behind.
+const PATIENCE: Duration = Duration::from_millis(300);
+
+/// A sampler for a page, and the object behind it if it is Python's.
+enum Chooser {
+    Kind(SamplerKind),
+    Own(OwnSampler, Option<Own>),
 }
 
-/// Everything else.
-pub(crate) struct What {
-    pub(crate) size: PictureSize,
-    pub(crate) camera: Camera,
-    pub(crate) sampler: SamplerKind,
-    pub(crate) reconstruction: ReconstructionKind,
-    pub(crate) batch_secs: f64,
-    pub(crate) budget: Option<f64>,
-    pub(crate) exposure: f32,
-    pub(crate) noisy: bool,
+impl Chooser {
+    fn of(given: &Bound<'_, PyAny>, raised: &Raised) -> PyResult<Chooser> {
+        if let Ok(name) = given.extract::<String>() {
+            return Ok(Chooser::Kind(sampler_kind(&name)?));
+        }
+        if let Ok(builtin) = given.cast::<BuiltinSampler>() {
+            let builtin = builtin.clone().unbind();
+            return Ok(Chooser::Own(Box::new(move || builtin.get().another()), None));
+        }
+        let own = Own::new(given.clone().unbind());
+        let sampler = PythonSampler::new(given, own.clone(), raised.clone())?;
+        let make = move || -> Box<dyn frameless::Sampler> { Box::new(sampler.another()) };
+        Ok(Chooser::Own(Box::new(make), Some(own)))
+    }
 }
 
 impl Served {
-    fn start(render: &Bound<'_, PyAny>, what: &What, at: Where) -> PyResult<Served> {
-        let address = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), at.port);
-        let options = Options { address, allow_frame: at.allow_frame, ..Options::default() };
-        let server = Server::bind(options).map_err(|e| PyOSError::new_err(format!("{e:#}")))?;
-        let (render, raised) = (Render::new(render.clone().unbind()), Raised::default());
-        let stage = PythonStage::new(render.clone(), what.camera, what.noisy, raised.clone());
-        let settings = Settings {
-            sampler: what.sampler,
-            reconstruction: what.reconstruction,
-            samples_per_sec: what.budget,
-            exposure_stops: what.exposure,
-            picture: Shown::Fixed(what.size.0),
-            ..Settings::default()
-        };
-        let clock = Clock::real_for_calls(what.batch_secs);
-        let session = Session::new(what.size.0, clock, settings, 1, stage);
-        let helm = Helm::without_scene(what.camera.view(), what.camera.target_point());
-        let show = Show { session, helm, scenes: None };
-        let (url, stopper) = (server.url(), server.stopper());
-        let thread = std::thread::Builder::new()
-            .name("frameless page".to_owned())
-            .spawn(move || server.run(show))?;
-        let size = (what.size.0.width, what.size.0.height);
-        Ok(Served { url, size, render, raised, stopper, thread: Mutex::new(Some(thread)) })
-    }
-
     fn thread(&self) -> std::sync::MutexGuard<'_, Option<JoinHandle<anyhow::Result<()>>>> {
         self.thread.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -86,15 +77,28 @@ impl Served {
         self.thread().as_ref().is_some_and(|thread| !thread.is_finished())
     }
 
-    /// Waits for the server's end, without the interpreter. Ctrl-C ends the waiting. In the thread that calls the renderer, and so has to end first,
-    /// there is nothing to wait for.
+    /// Waits for the server's end, without the interpreter. Ctrl-C ends the call of the renderer that is under way, or the waiting if it does not
+    /// end. In the thread that calls the renderer, and so has to end first, there is nothing to wait for.
     fn join(&self, py: Python<'_>) -> PyResult<()> {
-        if std::thread::current().name() == Some(frameless_session::LOOP_THREAD) {
+        if std::thread::current().name() == Some(LOOP_THREAD) {
             return Ok(());
         }
-        while self.is_running() {
+        let _waiting = self.calls.wait();
+        let given_up = self.given_up.load(Ordering::SeqCst);
+        let mut end = given_up.then(|| Instant::now() + PATIENCE);
+        let mut signal = Ok(());
+        while self.is_running() && end.is_none_or(|end| Instant::now() < end) {
             py.detach(|| std::thread::sleep(LOOK_EVERY));
-            py.check_signals()?;
+            if let Err(interrupt) = py.check_signals() {
+                signal = Err(interrupt);
+                self.calls.interrupt(py);
+                end = Some(Instant::now() + PATIENCE);
+                self.given_up.store(true, Ordering::SeqCst);
+            }
+        }
+        signal?;
+        if self.is_running() {
+            return Ok(());
         }
         let Some(thread) = self.thread().take() else { return Ok(()) };
         match py.detach(|| thread.join()) {
@@ -102,6 +106,15 @@ impl Served {
             Ok(Err(error)) => Err(PyRuntimeError::new_err(format!("{error:#}"))),
             Err(_) => Err(PyRuntimeError::new_err("the server panicked; its message is above")),
         }
+    }
+
+    /// Stops after Ctrl-C, for which nobody waits long.
+    fn give_up(&self, py: Python<'_>) {
+        self.given_up.store(true, Ordering::SeqCst);
+        self.calls.interrupt(py);
+        self.stopper.stop();
+        // What else it has to say is not what ends the program.
+        self.join(py).ok();
     }
 }
 
@@ -139,9 +152,7 @@ impl Served {
     /// Let another function render from now on; the picture stays until it is traced anew. Forgets what the old one raised.
     fn set_render(&self, py: Python<'_>, render: Py<PyAny>) -> PyResult<()> {
         if !render.bind(py).is_callable() {
-            return Err(PyValueError::new_err(
-                "render: wanted a function render(x, y, time, camera)",
-            ));
+            return Err(no_function());
         }
         self.render.set(py, render);
         self.raised.take().ok();
@@ -152,15 +163,20 @@ impl Served {
     /// have passed. Ctrl-C stops it, too.
     #[pyo3(signature = (seconds=None))]
     fn wait(&self, py: Python<'_>, seconds: Option<f64>) -> PyResult<()> {
+        let _waiting = self.calls.wait();
         let seconds = seconds.filter(|seconds| seconds.is_finite()).map(|seconds| seconds.max(0.0));
         let end = seconds.map(|seconds| Instant::now() + Duration::from_secs_f64(seconds.min(1e9)));
         while self.is_running() && end.is_none_or(|end| Instant::now() < end) {
             py.detach(|| std::thread::sleep(LOOK_EVERY));
-            let trouble = py.check_signals().and_then(|()| self.raised.take());
-            if trouble.is_err() {
+            if let Err(interrupt) = py.check_signals() {
+                self.give_up(py);
+                return Err(interrupt);
+            }
+            let raised = self.raised.take();
+            if raised.is_err() {
                 self.stopper.stop();
                 self.join(py)?;
-                return trouble;
+                return raised;
             }
         }
         Ok(())
@@ -184,10 +200,26 @@ impl Served {
         )
     }
 
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        // While it runs, another thread has hold of them.
+        let is_over = self.thread.try_lock().is_ok_and(|thread| thread.is_none());
+        let held = [Some(&self.render), self.sampler.as_ref()].into_iter().flatten();
+        held.filter(|_| is_over).try_for_each(|own| own.visit(&visit))
+    }
+
+    fn __clear__(&self) {
+        self.render.clear();
+        self.sampler.as_ref().inspect(|own| own.clear());
+    }
+
     fn __repr__(&self) -> String {
         let state = if self.is_running() { "at" } else { "stopped; was at" };
         format!("<frameless.Served {state} {}>", self.url)
     }
+}
+
+fn no_function() -> PyErr {
+    PyTypeError::new_err("render: wanted a function render(x, y, time, camera)")
 }
 
 /// See `frameless.serve`.
@@ -200,32 +232,58 @@ pub(crate) fn start_serving(
     render: &Bound<'_, PyAny>,
     size: PictureSize,
     camera: Camera,
-    sampler: &str,
+    sampler: &Bound<'_, PyAny>,
     reconstruction: &str,
     batch_ms: f64,
     budget: Option<f64>,
-    exposure: f32,
+    exposure: f64,
     noisy: bool,
-    port: u16,
+    port: i128,
     allow_frame: String,
 ) -> PyResult<Served> {
     if !render.is_callable() {
-        return Err(PyValueError::new_err("render: wanted a function render(x, y, time, camera)"));
+        return Err(no_function());
     }
-    let positive = |name: &str, value: f64| match value > 0.0 && value.is_finite() {
-        true => Ok(value),
-        false => {
-            Err(PyValueError::new_err(format!("{name}: wanted a number above 0, got {value}")))
-        }
+    let (raised, calls) = (Raised::default(), Calls::default());
+    let chooser = Chooser::of(sampler, &raised)?;
+    let settings = Settings {
+        sampler: match &chooser {
+            Chooser::Kind(kind) => *kind,
+            Chooser::Own(..) => SamplerKind::default(),
+        },
+        reconstruction: reconstruction_kind(reconstruction)?,
+        samples_per_sec: budget.map(|budget| positive("budget", budget)).transpose()?,
+        exposure_stops: stops(exposure)?,
+        picture: Shown::Fixed(size.0),
+        ..Settings::default()
     };
-    if !exposure.is_finite() {
-        return Err(PyValueError::new_err(format!(
-            "exposure: wanted finite stops, got {exposure}"
-        )));
-    }
-    let (sampler, reconstruction) = named(sampler, reconstruction)?;
-    let batch_secs = 1e-3 * positive("batch_ms", batch_ms)?;
-    let budget = budget.map(|budget| positive("budget", budget)).transpose()?;
-    let what = What { size, camera, sampler, reconstruction, batch_secs, budget, exposure, noisy };
-    Served::start(render, &what, Where { port, allow_frame: Some(allow_frame) })
+    let clock = Clock::real_for_calls(1e-3 * positive("batch_ms", batch_ms)?);
+    let port = whole("port", port, 0..=u16::MAX)?;
+    let address = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), port);
+    let options = Options { address, allow_frame: Some(allow_frame), ..Options::default() };
+    let server = Server::bind(options).map_err(|e| PyOSError::new_err(format!("{e:#}")))?;
+    let render = Own::new(render.clone().unbind());
+    let stage = PythonStage::new(render.clone(), camera, noisy, raised.clone(), calls.clone());
+    let session = Session::new(size.0, clock, settings, 1, stage);
+    let (session, sampler) = match chooser {
+        Chooser::Kind(_) => (session, None),
+        Chooser::Own(make, own) => (session.with_own_sampler(make), own),
+    };
+    let helm = Helm::without_scene(camera.view(), camera.target_point());
+    let show = Show { session, helm, scenes: None };
+    let (url, stopper) = (server.url(), server.stopper());
+    let thread = std::thread::Builder::new()
+        .name("frameless page".to_owned())
+        .spawn(move || server.run(show))?;
+    Ok(Served {
+        url,
+        size: (size.0.width, size.0.height),
+        render,
+        sampler,
+        raised,
+        calls,
+        stopper,
+        given_up: AtomicBool::new(false),
+        thread: Mutex::new(Some(thread)),
+    })
 }

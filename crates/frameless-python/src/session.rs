@@ -1,23 +1,26 @@
 //! The loop for those who own theirs: batches go out, answers come back, pictures at any time.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use frameless::{BatchLength, Clock, Display, Engine, Time};
+use frameless::{BatchLength, Clock, Display, Engine, SamplerKind, Time};
 use glam::{Affine3A, Mat4};
 use numpy::{PyArray2, PyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use pyo3::{PyTraverseError, PyVisit};
 
 use crate::array;
 use crate::batch::Batch;
 use crate::batches::Batches;
 use crate::camera::Camera;
 use crate::invoke;
+use crate::names::{finite, positive, reconstruction_kind, stops, whole};
 use crate::outside::{Outside, Placed};
+use crate::own::Own;
 use crate::planes;
-use crate::sampler::{from_python, named};
+use crate::sampler::from_python;
 use crate::shared::{Length, Raised, Shared, State};
 use crate::size::{PictureSize, pair};
 
@@ -31,7 +34,8 @@ use crate::size::{PictureSize, pair};
 /// Parameters:
 ///
 /// - `size`: (width, height) in pixels
-/// - `sampler`: a name ("adaptive", "change", "permutation", "random"; see BuiltinSampler) or an object with methods of Sampler
+/// - `sampler`: a name ("adaptive", "change", "permutation", "random"; see BuiltinSampler) or an object with methods of Sampler. What
+///     such an object raises arrives where the session was asked for a batch, or told of an answer, whose samples are kept all the same
 /// - `reconstruction`: "hold", "filter" or "reproject", the last with +relight, +deep, +antialias
 /// - `camera`: the Camera through which the renderer looks; needed if answers carry positions
 /// - `seed`: of all that is random
@@ -42,7 +46,7 @@ use crate::size::{PictureSize, pair};
 /// - `simulated`: samples per second of a simulated clock, on which sample n is traced at n / rate however long it takes: the same
 ///     seed makes the same pictures. Default: the machine's clock
 /// - `noisy`: whether colours have noise, as path tracing's; the renderer then makes its random numbers from Batch.seed
-/// - `exposure`: stops (powers of two) by which radiance is multiplied before it is shown
+/// - `exposure`: stops (powers of two), from -64 to 64, by which radiance is multiplied before it is shown
 ///
 /// Any thread may use a session; calls wait for each other, not for the interpreter. As a context manager it is closed at the end.
 ///
@@ -50,37 +54,22 @@ use crate::size::{PictureSize, pair};
 #[pyclass(frozen, module = "frameless")]
 pub(crate) struct Session {
     shared: Arc<Shared>,
+    /// The sampler, if it is an object of Python's.
+    own_sampler: Mutex<Option<Own>>,
     raised: Raised,
     simulated: bool,
     seed: u64,
 }
 
-fn positive(name: &str, value: f64) -> PyResult<f64> {
-    match value > 0.0 && value.is_finite() {
-        true => Ok(value),
-        false => {
-            Err(PyValueError::new_err(format!("{name}: wanted a number above 0, got {value}")))
-        }
-    }
-}
-
-fn finite(name: &str, value: f64) -> PyResult<f64> {
-    match value.is_finite() {
-        true => Ok(value),
-        false => Err(PyValueError::new_err(format!("{name}: wanted a finite number, got {value}"))),
-    }
-}
-
 // Samples per second: a batch of a millisecond must fit into memory.
 const FASTEST_SIMULATED: f64 = 1e10;
 
-fn length(batch: Option<usize>, batch_ms: f64) -> PyResult<Length> {
+const LARGEST_BATCH: u32 = 1 << 24;
+
+fn length(batch: Option<i128>, batch_ms: f64) -> PyResult<Length> {
     match batch {
         None => Ok(Length::Learned(BatchLength::new(1e-3 * positive("batch_ms", batch_ms)?))),
-        Some(samples @ 1..=16_777_216) => Ok(Length::Fixed(samples)),
-        Some(samples) => Err(PyValueError::new_err(format!(
-            "batch: wanted from 1 to 16777216 samples, got {samples}"
-        ))),
+        Some(samples) => Ok(Length::Fixed(whole("batch", samples, 1..=LARGEST_BATCH)? as usize)),
     }
 }
 
@@ -88,7 +77,7 @@ impl Session {
     /// The next batch that has samples, or `None` at the end. Looks for Ctrl-C while it waits.
     pub(crate) fn next_batch(&self, py: Python<'_>, end: Option<Time>) -> PyResult<Option<Batch>> {
         loop {
-            let chosen = self.shared.with(py, |state| {
+            let chosen = self.shared.with_long(py, move |state| {
                 let is_over = end.is_some_and(|end| state.engine.now() >= end);
                 if state.is_closed || is_over {
                     return None;
@@ -109,6 +98,10 @@ impl Session {
                 py.detach(|| std::thread::sleep(Duration::from_micros(500)));
             }
         }
+    }
+
+    fn own_sampler(&self) -> MutexGuard<'_, Option<Own>> {
+        self.own_sampler.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn end(&self, py: Python<'_>, seconds: Option<f64>) -> PyResult<Option<Time>> {
@@ -132,18 +125,19 @@ impl Session {
         sampler: Option<Bound<'_, PyAny>>,
         reconstruction: &str,
         camera: Option<Camera>,
-        seed: u64,
-        batch: Option<usize>,
+        seed: i128,
+        batch: Option<i128>,
         batch_ms: f64,
         budget: Option<f64>,
         simulated: Option<f64>,
         noisy: bool,
-        exposure: f32,
+        exposure: f64,
     ) -> PyResult<Session> {
-        let (default, reconstruction) = named("adaptive", reconstruction)?;
+        let seed = whole("seed", seed, 0..=u64::MAX)?;
+        let reconstruction = reconstruction_kind(reconstruction)?;
         let raised = Raised::default();
-        let sampler = match sampler {
-            None => default.build(seed),
+        let (sampler, own_sampler) = match sampler {
+            None => (SamplerKind::default().build(seed), None),
             Some(sampler) => from_python(&sampler, seed, &raised)?,
         };
         let clock = match simulated {
@@ -162,13 +156,14 @@ impl Session {
         };
         let mut engine = Engine::new(size.0, clock, sampler, Outside::new(camera, noisy));
         engine.set_reconstruction(reconstruction.build());
-        engine.set_display(Display::new(finite("exposure", exposure.into())? as f32));
+        engine.set_display(Display::new(stops(exposure)?));
         let budget = budget.map(|budget| positive("budget", budget)).transpose()?;
         engine.set_budget(budget);
         let mut state = State::new(engine, length(batch, batch_ms)?);
         state.budget = budget;
         let shared = Arc::new(Shared::new(state, raised.clone()));
-        Ok(Session { shared, raised, simulated: simulated.is_some(), seed })
+        let own_sampler = Mutex::new(own_sampler);
+        Ok(Session { shared, own_sampler, raised, simulated: simulated.is_some(), seed })
     }
 
     /// (width, height) in pixels.
@@ -246,8 +241,8 @@ impl Session {
     }
 
     #[setter]
-    fn set_exposure(&self, py: Python<'_>, stops: f32) -> PyResult<()> {
-        let stops = finite("exposure", stops.into())? as f32;
+    fn set_exposure(&self, py: Python<'_>, exposure: f64) -> PyResult<()> {
+        let stops = stops(exposure)?;
         self.shared.with(py, |state| state.engine.set_display(Display::new(stops)))
     }
 
@@ -297,13 +292,17 @@ impl Session {
 
     /// Let another sampler choose from now on, by name or as an object; the picture stays.
     fn set_sampler(&self, py: Python<'_>, sampler: &Bound<'_, PyAny>) -> PyResult<()> {
-        let sampler = from_python(sampler, self.seed, &self.raised)?;
-        self.shared.with(py, |state| state.engine.set_sampler(sampler))
+        let (sampler, own) = from_python(sampler, self.seed, &self.raised)?;
+        // The one before goes without any lock held: what it does then may ask for this session.
+        let before = self.shared.with(py, |state| state.engine.replace_sampler(sampler))?;
+        let own_before = std::mem::replace(&mut *self.own_sampler(), own);
+        drop((before, own_before));
+        Ok(())
     }
 
     /// Make pictures in another way from now on; what the canvas holds stays.
     fn set_reconstruction(&self, py: Python<'_>, name: &str) -> PyResult<()> {
-        let (_, reconstruction) = named("adaptive", name)?;
+        let reconstruction = reconstruction_kind(name)?;
         self.shared.with(py, |state| state.engine.set_reconstruction(reconstruction.build()))
     }
 
@@ -314,7 +313,7 @@ impl Session {
     fn image<'py>(
         &self,
         py: Python<'py>,
-        out: Option<Bound<'py, PyArray3<f32>>>,
+        out: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArray3<f32>>> {
         planes::image(py, &self.shared, None, out)
     }
@@ -404,6 +403,18 @@ impl Session {
     /// No more batches: loops over the session end. Pictures can still be asked for, and late answers given.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
         self.shared.with(py, |state| state.is_closed = true)
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        match self.own_sampler.try_lock().as_deref() {
+            Ok(Some(own)) => own.visit(&visit),
+            Ok(None) | Err(_) => Ok(()),
+        }
+    }
+
+    fn __clear__(&self) {
+        let own = self.own_sampler().take();
+        own.inspect(Own::clear);
     }
 
     fn __iter__(slf: Bound<'_, Session>) -> Batches {

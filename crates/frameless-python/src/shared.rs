@@ -7,6 +7,7 @@ use frameless::{BatchLength, Engine, Observation, Time};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
+use crate::interrupt::interruptible;
 use crate::outside::Outside;
 
 /// What a sampler written in Python has raised, until somebody can be told.
@@ -21,6 +22,12 @@ impl Raised {
 
     pub(crate) fn is_set(&self) -> bool {
         self.slot().is_some()
+    }
+
+    /// What it is, in a line; `None` if nothing has been raised.
+    pub(crate) fn describe(&self, py: Python<'_>) -> Option<String> {
+        let error = self.slot().as_ref().map(|error| error.clone_ref(py))?;
+        Some(error.to_string())
     }
 
     pub(crate) fn take(&self) -> PyResult<()> {
@@ -73,8 +80,14 @@ const REFRESH_SECS: f64 = 1.0 / 60.0;
 /// Pictures that nobody has asked for take at most a fifth of the time.
 const COSTS_PER_REFRESH: f64 = 5.0;
 
+/// Starting more takes longer than they save.
+const MOST_REFRESH_THREADS: usize = 8;
+
 impl State {
-    pub(crate) fn new(engine: Engine<Outside>, length: Length) -> State {
+    pub(crate) fn new(mut engine: Engine<Outside>, length: Length) -> State {
+        // Nothing else is done in a session while it makes a picture.
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        engine.set_refresh_threads(cores.min(MOST_REFRESH_THREADS));
         let changes = vec![f32::NAN; engine.canvas().size().pixels()];
         let generation = engine.canvas().generation();
         let refreshes = Refreshes::default();
@@ -127,6 +140,9 @@ impl State {
     }
 }
 
+/// Pixels from which on a picture may take longer than one would wait for Ctrl-C.
+const LARGE_PICTURE: usize = 1 << 21;
+
 /// A [`State`] behind a lock.
 pub(crate) struct Shared {
     state: Mutex<State>,
@@ -160,19 +176,41 @@ impl Shared {
         py: Python<'_>,
         work: impl FnOnce(&mut State) -> R + Send,
     ) -> PyResult<R> {
-        if HOLDS.get() {
-            let message =
-                "a sampler must not use a session or a canvas other than the one it is given";
-            return Err(PyRuntimeError::new_err(message));
-        }
-        let outcome = py.detach(|| {
-            // A panic leaves a canvas with some samples missing, which is nothing special.
-            let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-            HOLDS.set(true);
-            let _holding = Holding;
-            work(&mut state)
-        });
+        Shared::must_not_hold()?;
+        let outcome = py.detach(|| self.locked(work));
         self.raised.take()?;
         Ok(outcome)
+    }
+
+    /// As [`Shared::with`], for what takes long on large pictures: Ctrl-C ends the waiting; the work goes on to its end.
+    pub(crate) fn with_long<R: Send + 'static>(
+        self: &Arc<Self>,
+        py: Python<'_>,
+        work: impl FnOnce(&mut State) -> R + Send + 'static,
+    ) -> PyResult<R> {
+        if self.with(py, |state| state.engine.canvas().size().pixels())? < LARGE_PICTURE {
+            return self.with(py, work);
+        }
+        let shared = Arc::clone(self);
+        let outcome = interruptible(py, move |_| shared.locked(work))?;
+        self.raised.take()?;
+        Ok(outcome)
+    }
+
+    fn must_not_hold() -> PyResult<()> {
+        match HOLDS.get() {
+            true => Err(PyRuntimeError::new_err(
+                "a sampler must not use a session or a canvas other than the one it is given",
+            )),
+            false => Ok(()),
+        }
+    }
+
+    fn locked<R>(&self, work: impl FnOnce(&mut State) -> R) -> R {
+        // A panic leaves a canvas with some samples missing, which is nothing special.
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        HOLDS.set(true);
+        let _holding = Holding;
+        work(&mut state)
     }
 }

@@ -1,48 +1,26 @@
 //! A function in Python as the renderer of a loop that runs in a thread of its own.
 
 use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use frameless::{Answer, Batch, Pose, Size, Tracer};
 use frameless_session::{Stage, ViewChoice};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
 
+use crate::calls::Calls;
 use crate::camera::Camera;
 use crate::invoke;
 use crate::outside::Outside;
+use crate::own::Own;
 use crate::shared::Raised;
-
-/// The function, which may be replaced by another while the loop runs.
-#[derive(Clone)]
-pub(crate) struct Render(Arc<Mutex<Py<PyAny>>>);
-
-impl Render {
-    pub(crate) fn new(render: Py<PyAny>) -> Render {
-        Render(Arc::new(Mutex::new(render)))
-    }
-
-    pub(crate) fn set(&self, py: Python<'_>, render: Py<PyAny>) {
-        let old = std::mem::replace(&mut *self.lock(), render);
-        // What it does when it goes may ask for the lock.
-        old.drop_ref(py);
-    }
-
-    fn get(&self, py: Python<'_>) -> Py<PyAny> {
-        self.lock().clone_ref(py)
-    }
-
-    fn lock(&self) -> std::sync::MutexGuard<'_, Py<PyAny>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
 
 /// Calls the function for every batch, with the interpreter held. What it raises is kept in `raised`; it is not called again until
 /// somebody has taken that.
 pub(crate) struct PythonStage {
-    render: Render,
+    render: Own,
     raised: Raised,
+    calls: Calls,
     outside: Outside,
     /// The renderer's own camera, to come back to.
     own_camera: Camera,
@@ -53,21 +31,27 @@ pub(crate) struct PythonStage {
 const REST: Duration = Duration::from_millis(20);
 
 impl PythonStage {
+    /// `render` may be replaced by another while the loop runs.
     pub(crate) fn new(
-        render: Render,
+        render: Own,
         camera: Camera,
         is_noisy: bool,
         raised: Raised,
+        calls: Calls,
     ) -> PythonStage {
         let outside = Outside::new(Some(camera), is_noisy);
-        PythonStage { render, raised, outside, own_camera: camera, answers: VecDeque::new() }
+        PythonStage { render, raised, calls, outside, own_camera: camera, answers: VecDeque::new() }
     }
 
     fn answer(&mut self, py: Python<'_>, batch: &Batch) -> PyResult<Answer> {
         let camera = self.outside.camera.unwrap_or(self.own_camera);
         let render = self.render.get(py);
+        let render = render.ok_or_else(|| PyRuntimeError::new_err("the renderer is gone"))?;
         let shown = Some(camera.of_size(batch.size));
-        let returned = invoke::call(render.bind(py), batch, shown, self.outside.is_noisy)?;
+        let returned = {
+            let _calling = self.calls.begin(py)?;
+            invoke::call(&render, batch, shown, self.outside.is_noisy)?
+        };
         let at = |i: usize| {
             let [x, y] = batch.requests[i].position_px(batch.size);
             format!("sample {i} (x = {x}, y = {y})")
@@ -80,6 +64,23 @@ impl PythonStage {
     }
 }
 
+impl PythonStage {
+    fn fail(&mut self, error: PyErr) {
+        Python::attach(|py| {
+            let is_interrupt = error.is_instance_of::<PyKeyboardInterrupt>(py);
+            if !is_interrupt && !self.calls.has_waiting() {
+                error.display(py);
+                let advice = "frameless: the picture stands still until page.check(), page.set_render(...) or page.stop()\n";
+                // Where there is no stderr nobody reads it.
+                py.import("sys")
+                    .and_then(|sys| sys.getattr("stderr")?.call_method1("write", (advice,)))
+                    .ok();
+            }
+        });
+        self.raised.set(error);
+    }
+}
+
 impl Tracer for PythonStage {
     fn submit(&mut self, batch: Batch) {
         if self.raised.is_set() {
@@ -89,8 +90,8 @@ impl Tracer for PythonStage {
         // No interpreter: the program is ending.
         match Python::try_attach(|py| self.answer(py, &batch)) {
             Some(Ok(answer)) => self.answers.push_back(answer),
-            Some(Err(error)) => self.raised.set(error),
-            None => self.raised.set(PyValueError::new_err("the interpreter is gone")),
+            Some(Err(error)) => self.fail(error),
+            None => self.raised.set(PyRuntimeError::new_err("the interpreter is gone")),
         }
     }
 
@@ -119,4 +120,9 @@ impl Stage for PythonStage {
     }
 
     fn set_world(&mut self, (): ()) {}
+
+    fn trouble(&mut self) -> Option<String> {
+        let raised = Python::try_attach(|py| self.raised.describe(py)).flatten()?;
+        Some(format!("the renderer has failed: {raised}"))
+    }
 }

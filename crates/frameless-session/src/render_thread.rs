@@ -120,11 +120,12 @@ fn run<S: Stage>(
         for command in size.map(Command::Size).into_iter().chain(settings.map(Command::Settings)) {
             session.apply(command);
         }
-        if let Err(error) = session.step()
-            && session.now() >= next_error
+        let trouble = session.step().err().map(|error| error.to_string());
+        if session.now() >= next_error
+            && let Some(trouble) = trouble.or_else(|| session.trouble())
         {
             next_error = Time::from_secs(session.now().secs() + SECS_BETWEEN_ERRORS);
-            report(Report::Error(error.to_string()));
+            report(Report::Error(trouble));
         }
         if wanted.is_some() && session.is_worth_showing() && pace.is_due(session.now()) {
             let begin = session.now();

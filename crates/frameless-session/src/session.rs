@@ -3,8 +3,8 @@
 //! No thread and no window here: see `render_thread.rs`.
 
 use frameless::{
-    AdaptiveOptions, Clock, Display, Engine, EngineError, ReconstructionKind, SamplerKind, Size,
-    Time, Tracer,
+    AdaptiveOptions, Clock, Display, Engine, EngineError, ReconstructionKind, Sampler, SamplerKind,
+    Size, Time, Tracer,
 };
 
 use crate::command::{Command, Picture, Status, ViewChoice};
@@ -23,12 +23,21 @@ pub trait Stage: Tracer {
 
     /// Batches submitted from now on show that scene.
     fn set_world(&mut self, world: Self::World);
+
+    /// Why no answers come, if it has failed and waits to be mended.
+    fn trouble(&mut self) -> Option<String> {
+        None
+    }
 }
+
+/// Makes a sampler that is none of [`SamplerKind`]'s.
+pub type OwnSampler = Box<dyn FnMut() -> Box<dyn Sampler> + Send>;
 
 /// An engine with its settings.
 pub struct Session<S> {
     engine: Engine<Counted<S>>,
     settings: Settings,
+    own_sampler: Option<OwnSampler>,
     seed: u64,
     held: Shown,
     heat_maps: HeatMaps,
@@ -46,7 +55,17 @@ impl<S: Stage> Session<S> {
         engine.set_reconstruction(settings.reconstruction.build());
         let held = Shown::new(engine.canvas(), *engine.display());
         let (heat_maps, throughput) = (HeatMaps::default(), Throughput::default());
-        Session { engine, settings, seed, held, heat_maps, throughput, mark: 0 }
+        let settings = Settings { own_sampler: None, ..settings };
+        let own_sampler = None;
+        Session { engine, settings, own_sampler, seed, held, heat_maps, throughput, mark: 0 }
+    }
+
+    /// Another sampler among those that the user may choose from; it begins.
+    pub fn with_own_sampler(mut self, mut make: OwnSampler) -> Self {
+        self.engine.set_sampler(make());
+        self.settings.own_sampler = Some(true);
+        self.own_sampler = Some(make);
+        self
     }
 
     /// Make pictures with so many threads; 0: one per core. One, unless this is called.
@@ -113,20 +132,10 @@ impl<S: Stage> Session<S> {
 
     /// Applies what differs, so that moving one slider does not make the sampler forget what it has learned.
     fn set(&mut self, new: Settings) {
+        let own_sampler = self.own_sampler.as_ref().map(|_| new.own_sampler == Some(true));
+        let new = Settings { own_sampler, ..new };
         let old = std::mem::replace(&mut self.settings, new);
-        match (old.sampler, new.sampler) {
-            (SamplerKind::Adaptive(before), SamplerKind::Adaptive(now))
-                if (AdaptiveOptions { temporal: now.temporal, ..before }) == now =>
-            {
-                self.engine.set_temporal(now.temporal);
-            }
-            (old, new) if old == new => {}
-            (_, new) => {
-                // Another seed than before: a sampler chosen again does not repeat itself.
-                self.seed = self.seed.wrapping_add(1);
-                self.engine.set_sampler(new.build(self.seed));
-            }
-        }
+        self.set_sampler(&old, &new);
         if new.samples_per_sec != old.samples_per_sec {
             self.engine.set_budget(new.samples_per_sec);
         }
@@ -142,6 +151,34 @@ impl<S: Stage> Session<S> {
         if new.overlay != Overlay::Change {
             self.heat_maps.forget_changes();
         }
+    }
+
+    fn set_sampler(&mut self, old: &Settings, new: &Settings) {
+        if let (Some(true), Some(make)) = (new.own_sampler, &mut self.own_sampler) {
+            if old.own_sampler != Some(true) {
+                self.engine.set_sampler(make());
+            }
+            return;
+        }
+        match (old.sampler, new.sampler) {
+            (SamplerKind::Adaptive(before), SamplerKind::Adaptive(now))
+                if old.own_sampler == new.own_sampler
+                    && (AdaptiveOptions { temporal: now.temporal, ..before }) == now =>
+            {
+                self.engine.set_temporal(now.temporal);
+            }
+            (before, now) if before == now && old.own_sampler == new.own_sampler => {}
+            (_, now) => {
+                // Another seed than before: a sampler chosen again does not repeat itself.
+                self.seed = self.seed.wrapping_add(1);
+                self.engine.set_sampler(now.build(self.seed));
+            }
+        }
+    }
+
+    /// See [`Stage::trouble`].
+    pub fn trouble(&mut self) -> Option<String> {
+        self.engine.tracer_mut().tracer.trouble()
     }
 
     /// Whether there is more than the first few samples, or no hope of more soon. The first batches are tiny, until the clock
@@ -397,6 +434,45 @@ mod tests {
     }
 
     #[test]
+    fn an_own_sampler_chooses_until_another_is_chosen_and_when_it_is_chosen_again() {
+        let make = || -> Box<dyn frameless::Sampler> { Box::new(First) };
+        let mut session =
+            white_session_with(ReconstructionKind::Hold).with_own_sampler(Box::new(make));
+        let own = session.settings;
+        session.apply(Command::Scene(0.0));
+        run(&mut session, 0.05);
+        assert!(brightness(&mut session) > 254.0, "only the first pixel is looked at");
+        for (settings, is_own) in [
+            (Settings { own_sampler: Some(false), ..own }, Some(false)),
+            (own, Some(true)),
+            (Settings { own_sampler: None, ..own }, Some(false)),
+        ] {
+            session.apply(Command::Settings(settings));
+            assert_eq!(session.settings().own_sampler, is_own);
+        }
+        run(&mut session, 0.05);
+        assert_eq!(brightness(&mut session), 0.0);
+        let mut plain = white_session();
+        plain.apply(Command::Settings(own));
+        assert_eq!(plain.settings().own_sampler, None, "it has none");
+    }
+
+    /// Looks at one pixel.
+    struct First;
+
+    impl Sampler for First {
+        fn choose(
+            &mut self,
+            _: Time,
+            _: &frameless::Canvas,
+            count: usize,
+            requests: &mut Vec<frameless::Request>,
+        ) {
+            requests.extend((0..count).map(|_| frameless::Request::centre(0)));
+        }
+    }
+
+    #[test]
     fn every_overlay_has_a_legend_and_the_picture_comes_back() {
         let mut session = white_session();
         let adaptive = Settings { sampler: SamplerKind::ADAPTIVE, ..session.settings };
@@ -474,7 +550,8 @@ mod tests {
 
     #[test]
     fn throughput_and_ages_are_those_of_the_simulated_clock() {
-        let mut session = white_session();
+        // With antialias most looks at what rests would add to its samples, and leave their age.
+        let mut session = white_session_with(ReconstructionKind::Hold);
         session.picture(Vec::new());
         run(&mut session, 1.0);
         let status = session.picture(Vec::new()).status;

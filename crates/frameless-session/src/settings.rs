@@ -7,6 +7,8 @@ use frameless::{Display, ReconstructionKind, SamplerKind, Size, ToneMap};
 pub struct Settings {
     /// Who chooses the pixels, with its parameters.
     pub sampler: SamplerKind,
+    /// Whether the renderer's own sampler chooses the pixels instead; `None` if it has none. See [`crate::Session::with_own_sampler`].
+    pub own_sampler: Option<bool>,
     /// How the picture is made of the samples.
     pub reconstruction: ReconstructionKind,
     /// At most this many samples per second; `None`: as many as the renderer can.
@@ -25,6 +27,7 @@ impl Default for Settings {
     fn default() -> Self {
         Settings {
             sampler: SamplerKind::default(),
+            own_sampler: None,
             reconstruction: ReconstructionKind::default(),
             samples_per_sec: None,
             exposure_stops: 0.0,

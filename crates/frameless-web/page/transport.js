@@ -31,10 +31,12 @@ export class Transport {
     this.#send({ type: "play", on: !this.#playing });
   }
 
+  /** `duration_secs`: 0 where nothing moves, null where time goes on without end: then there is nothing to scrub. */
   scene({ duration_secs: duration }) {
-    this.#duration = duration;
-    byId("time").hidden = !(duration > 0);
-    byId("timeless").hidden = duration > 0;
+    this.#duration = duration ?? Infinity;
+    byId("time").hidden = !(this.#duration > 0);
+    byId("timeless").hidden = this.#duration > 0;
+    byId("scrub").hidden = duration === null;
     byId("scrub").max = duration > 0 ? duration : 1;
     this.#write(this.#told.secs);
   }
@@ -68,14 +70,16 @@ export class Transport {
 
   #write(secs) {
     if (!(this.#duration > 0)) return;
-    const at = ((secs % this.#duration) + this.#duration) % this.#duration;
-    byId("scrub").value = at;
+    const isEndless = this.#duration === Infinity;
+    const at = isEndless ? secs : ((secs % this.#duration) + this.#duration) % this.#duration;
+    if (!isEndless) byId("scrub").value = at;
     this.#writeClock(at);
   }
 
   #writeClock(at) {
     fill(byId("scrub"));
-    const written = `${at.toFixed(2)} / ${this.#duration.toFixed(2)} s`;
+    const end = this.#duration === Infinity ? "" : ` / ${this.#duration.toFixed(2)}`;
+    const written = `${at.toFixed(2)}${end} s`;
     if (byId("clock").textContent === written) return;
     byId("clock").textContent = written;
     byId("scrub").setAttribute("aria-valuetext", `${at.toFixed(2)} seconds`);

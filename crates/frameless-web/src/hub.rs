@@ -449,7 +449,8 @@ impl<W: Send + 'static> Hub<W> {
     }
 
     fn welcome(&self, client: u32, token: &Secret) -> Told {
-        legend::welcome(client, token, self.scenes.as_ref().map(|scenes| scenes.limits.file_bytes))
+        let upload_bytes = self.scenes.as_ref().map(|scenes| scenes.limits.file_bytes);
+        legend::welcome(client, token, upload_bytes, self.settings.own_sampler.is_some())
     }
 
     fn scene(&self) -> Told {
@@ -463,7 +464,8 @@ impl<W: Send + 'static> Hub<W> {
             name: shortened(&scene.name),
             notes: some(&scene.notes),
             warnings: some(&scene.warnings),
-            duration_secs: scene.animation.duration_secs,
+            // Of a renderer's own scene nobody knows when it ends.
+            duration_secs: self.scenes.is_some().then_some(scene.animation.duration_secs),
             cameras: scene.cameras.iter().take(MOST_TEXTS).enumerate().map(name).collect(),
         }
     }

@@ -11,7 +11,12 @@ use crate::wire::{Choice, NamedColour, Told, VERSION};
 const COLOURS: usize = 36;
 
 /// First and once. `upload_bytes` is none where the renderer takes no scenes.
-pub(crate) fn welcome(client: u32, token: &Secret, upload_bytes: Option<u64>) -> Told {
+pub(crate) fn welcome(
+    client: u32,
+    token: &Secret,
+    upload_bytes: Option<u64>,
+    has_own_sampler: bool,
+) -> Told {
     let scenes = BUILTIN_NAMES.into_iter().zip(BUILTIN_DESCRIPTIONS);
     let choice = |(name, description)| Choice { name, title: None, description };
     Told::Welcome {
@@ -21,7 +26,7 @@ pub(crate) fn welcome(client: u32, token: &Secret, upload_bytes: Option<u64>) ->
         token: token.as_str().to_owned(),
         upload_bytes: upload_bytes.unwrap_or(0),
         scenes: if upload_bytes.is_some() { scenes.map(choice).collect() } else { Vec::new() },
-        samplers: settings::samplers(),
+        samplers: settings::samplers(has_own_sampler),
         tone_maps: settings::tone_maps(),
         overlays: settings::overlays(),
     }

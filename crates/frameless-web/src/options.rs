@@ -125,12 +125,13 @@ fn is_host(host: &str) -> bool {
     !host.is_empty() && host.bytes().all(is_letter)
 }
 
-/// Scheme and host, with or without a port. Nothing stands for several: a star would allow every site.
+/// Scheme and host, with or without a port, which may be a star for any. No star stands for hosts: that would allow every site.
 fn is_origin(origin: &str) -> bool {
     let rest = origin.strip_prefix("http://").or(origin.strip_prefix("https://"));
     let Some(rest) = rest else { return false };
     // An address of version 6 has colons of its own, in brackets.
     match rest.rsplit_once(':').filter(|(_, port)| !port.ends_with(']')) {
+        Some((host, "*")) => is_host(host),
         Some((host, port)) => is_host(host) && port.parse::<u16>().is_ok_and(|port| port > 0),
         None => is_host(rest),
     }
@@ -219,8 +220,13 @@ mod tests {
     fn a_frames_origin_cannot_smuggle_a_policy_in() {
         let allowing =
             |origin: &str| Options { allow_frame: Some(origin.to_owned()), ..Options::default() };
-        for good in ["http://localhost:8888", "https://a.example", "http://[::1]:1", "http://[::1]"]
-        {
+        for good in [
+            "http://localhost:8888",
+            "http://localhost:*",
+            "https://a.example",
+            "http://[::1]:1",
+            "http://[::1]",
+        ] {
             allowing(good).check().unwrap();
         }
         for bad in [
@@ -228,6 +234,7 @@ mod tests {
             "localhost",
             "http://",
             "http://*",
+            "http://*:*",
             "https://*.example",
             "http://a:",
             "http://a:0",

@@ -21,8 +21,10 @@ pub(crate) fn state(settings: &Settings) -> SettingsState {
         SamplerKind::Change { w_d, tile } => (None, Some(w_d), Some(tile)),
         SamplerKind::Random | SamplerKind::Permutation => (None, None, None),
     };
+    let is_own = settings.own_sampler == Some(true);
+    let (temporal, w_d, tile) = if is_own { (None, None, None) } else { (temporal, w_d, tile) };
     SettingsState {
-        sampler: settings.sampler.name(),
+        sampler: sampler_name(settings),
         temporal,
         w_d,
         tile,
@@ -42,12 +44,11 @@ pub(crate) fn state(settings: &Settings) -> SettingsState {
 pub(crate) fn changed(settings: &Settings, change: &SettingsChange) -> Result<Settings, String> {
     let mut new = *settings;
     if let Some(name) = &change.sampler
-        && *name != settings.sampler.name()
+        && *name != sampler_name(settings)
     {
-        new.sampler = SamplerKind::from_name(name)
-            .ok_or_else(|| format!("there is no sampler {}", quoted(name)))?;
+        set_sampler(&mut new, name)?;
     }
-    set_options(&mut new.sampler, change)?;
+    set_options(&mut new, change)?;
     if let Some(name) = &change.reconstruction {
         new.reconstruction = ReconstructionKind::from_name(name)
             .ok_or_else(|| format!("there is no reconstruction {}", quoted(name)))?;
@@ -82,23 +83,50 @@ pub(crate) fn changed(settings: &Settings, change: &SettingsChange) -> Result<Se
     Ok(new)
 }
 
-fn set_options(sampler: &mut SamplerKind, change: &SettingsChange) -> Result<(), String> {
+/// The renderer's own sampler among the others.
+const OWN_SAMPLER: &str = "own";
+
+fn sampler_name(settings: &Settings) -> &'static str {
+    match settings.own_sampler {
+        Some(true) => OWN_SAMPLER,
+        _ => settings.sampler.name(),
+    }
+}
+
+fn set_sampler(settings: &mut Settings, name: &str) -> Result<(), String> {
+    let is_own = name == OWN_SAMPLER && settings.own_sampler.is_some();
+    if !is_own {
+        settings.sampler = SamplerKind::from_name(name)
+            .ok_or_else(|| format!("there is no sampler {}", quoted(name)))?;
+    }
+    settings.own_sampler = settings.own_sampler.map(|_| is_own);
+    Ok(())
+}
+
+fn set_options(settings: &mut Settings, change: &SettingsChange) -> Result<(), String> {
+    let (temporal, w_d, tile) =
+        (change.temporal.flatten(), change.w_d.flatten(), change.tile.flatten());
+    let tells_any = temporal.is_some() || w_d.is_some() || tile.is_some();
+    if settings.own_sampler == Some(true) && tells_any {
+        return Err(format!("the sampler {OWN_SAMPLER} has none of temporal, w_d and tile"));
+    }
+    let sampler = &mut settings.sampler;
     let is_fraction = |number: f32| (0.0..=1.0).contains(&number);
-    if let Some(Some(wanted)) = change.temporal {
+    if let Some(wanted) = temporal {
         match sampler {
             SamplerKind::Adaptive(options) if is_fraction(wanted) => options.temporal = wanted,
             SamplerKind::Adaptive(_) => return Err(format!("temporal {wanted}: wanted 0 to 1")),
             other => return Err(format!("the sampler {} has no temporal", other.name())),
         }
     }
-    if let Some(Some(wanted)) = change.w_d {
+    if let Some(wanted) = w_d {
         match sampler {
             SamplerKind::Change { w_d, .. } if is_fraction(wanted) => *w_d = wanted,
             SamplerKind::Change { .. } => return Err(format!("w_d {wanted}: wanted 0 to 1")),
             other => return Err(format!("the sampler {} has no w_d", other.name())),
         }
     }
-    if let Some(Some(wanted)) = change.tile {
+    if let Some(wanted) = tile {
         match sampler {
             SamplerKind::Change { tile, .. } if TILES.contains(&wanted) => *tile = wanted,
             SamplerKind::Change { .. } => return Err(format!("tile {wanted}: wanted 1 to 64")),
@@ -191,8 +219,13 @@ pub(crate) fn tone_maps() -> Vec<Choice> {
     ToneMap::ALL.into_iter().map(choice).collect()
 }
 
-/// The samplers, the best first.
-pub(crate) fn samplers() -> Vec<Choice> {
+/// The samplers, the best first; before them the renderer's own, if it has one.
+pub(crate) fn samplers(has_own: bool) -> Vec<Choice> {
+    let own = Choice {
+        name: OWN_SAMPLER,
+        title: None,
+        description: "the sampler that the renderer has brought with it",
+    };
     let choice = |kind: &SamplerKind| Choice {
         name: kind.name(),
         title: None,
@@ -205,7 +238,7 @@ pub(crate) fn samplers() -> Vec<Choice> {
             }
         },
     };
-    SamplerKind::ALL.iter().rev().map(choice).collect()
+    has_own.then_some(own).into_iter().chain(SamplerKind::ALL.iter().rev().map(choice)).collect()
 }
 
 /// What a client wrote, short enough to be shown.
@@ -234,6 +267,23 @@ mod tests {
         let brighter = change(r#"{"type": "settings", "exposure_stops": 1}"#);
         let after = changed(&before, &brighter).unwrap();
         assert_eq!(after, Settings { exposure_stops: 1.0, ..before });
+    }
+
+    #[test]
+    fn an_own_sampler_is_one_among_the_others() {
+        let says = |json: &str| match Said::parse(&format!("{{\"type\":\"settings\",{json}}}")) {
+            Ok(Said::Settings(change)) => change,
+            other => panic!("{other:?}"),
+        };
+        let plain = Settings::default();
+        assert!(changed(&plain, &says("\"sampler\":\"own\"")).is_err(), "there is none");
+        let own = Settings { own_sampler: Some(true), ..plain };
+        assert_eq!(state(&own).sampler, "own");
+        assert!(changed(&own, &says("\"temporal\":0.5")).is_err());
+        let other = changed(&own, &says("\"sampler\":\"random\"")).unwrap();
+        assert_eq!((other.own_sampler, other.sampler), (Some(false), SamplerKind::Random));
+        assert_eq!(changed(&other, &says("\"sampler\":\"own\"")).unwrap().own_sampler, Some(true));
+        assert_eq!((samplers(true).len(), samplers(false).len()), (5, 4));
     }
 
     #[test]

@@ -157,9 +157,10 @@ impl Real {
     pub(crate) fn next_batch(&mut self, wanted: usize) -> (Time, usize) {
         let now = self.now();
         let Some(budget) = self.budget_per_sec else { return (now, wanted) };
-        // What was not used in time is lost: a renderer that stood still does not catch up in a burst.
+        // What was not used in time is lost, but for one batch: a renderer that stood still does not catch up in a burst, and one
+        // whose calls take long is not starved.
         let earned = budget * now.secs_since(self.allowance_at);
-        let most = (2.0 * budget / f64::from(BATCHES_PER_SEC)).max(1.0);
+        let most = (2.0 * budget / f64::from(BATCHES_PER_SEC)).max(wanted as f64).max(1.0);
         self.allowance = (self.allowance + earned).min(most);
         self.allowance_at = now;
         let count = wanted.min(self.allowance as usize);

@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::add_up::AddUp;
 use crate::{
     Answer, Batch, Canvas, Clock, Display, Findings, Hold, Kept, Lighting, Observation, Pose,
     Rates, Reconstruction, Refresh, Request, Sampler, Size, Surface, Time, Timeline, Tracer,
@@ -15,6 +16,7 @@ pub struct Engine<T> {
     display: Display,
     canvas: Canvas,
     sampler: Box<dyn Sampler>,
+    add_up: AddUp,
     reconstruction: Box<dyn Reconstruction>,
     tracer: T,
     // Samples submitted and not yet answered.
@@ -45,7 +47,7 @@ struct Replaced {
 /// What the loop has done so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
-    /// Batches chosen.
+    /// Batches chosen, but for empty ones.
     pub batches: u64,
     /// Samples written to the canvas.
     pub kept: u64,
@@ -130,6 +132,7 @@ impl<T: Tracer> Engine<T> {
             display: Display::default(),
             canvas,
             sampler,
+            add_up: AddUp::default(),
             reconstruction: Box::new(Hold::default()),
             tracer,
             outstanding: 0,
@@ -225,10 +228,15 @@ impl<T: Tracer> Engine<T> {
     fn batch(&mut self, now: Time, count: usize) -> Batch {
         let mut requests = std::mem::take(&mut self.spare_requests);
         requests.clear();
-        self.sampler.choose(now, &self.canvas, count, &mut requests);
+        if count > 0 {
+            self.sampler.choose(now, &self.canvas, count, &mut requests);
+        }
+        if !self.sampler.refines() {
+            self.add_up.turn(&self.canvas, &mut requests);
+        }
         self.reconstruction.aim(now, &self.canvas, &mut requests);
         let (id, scene_secs) = (self.counters.batches, self.timeline.scene_secs(now));
-        self.counters.batches += 1;
+        self.counters.batches += u64::from(!requests.is_empty());
         Batch { id, now, scene_secs, size: self.canvas.size(), requests }
     }
 
@@ -341,7 +349,11 @@ impl<T: Tracer> Engine<T> {
             let refinement = refinements.get(i).copied().flatten();
             Observation { pixel: request.pixel, now, previous, known, change, refinement }
         }));
-        self.sampler.observe(&self.canvas, &self.observations);
+        let told = match self.sampler.refines() {
+            true => &self.observations,
+            false => self.add_up.told(&self.observations),
+        };
+        self.sampler.observe(&self.canvas, told);
         self.counters.kept += self.observations.len() as u64;
         self.observations.len()
     }
@@ -441,7 +453,12 @@ impl<T: Tracer> Engine<T> {
 
     /// Let somebody else choose the pixels; the picture stays.
     pub fn set_sampler(&mut self, sampler: Box<dyn Sampler>) {
-        self.sampler = sampler;
+        self.replace_sampler(sampler);
+    }
+
+    /// As [`Engine::set_sampler`]; returns who has chosen until now.
+    pub fn replace_sampler(&mut self, sampler: Box<dyn Sampler>) -> Box<dyn Sampler> {
+        std::mem::replace(&mut self.sampler, sampler)
     }
 
     /// What has been learned of how fast each part of the picture changes; `None` if the sampler learns no such thing, or

@@ -25,6 +25,7 @@
 //! # Ok::<(), frameless::EngineError>(())
 //! ```
 
+mod add_up;
 mod alias;
 mod bands;
 mod batch_length;

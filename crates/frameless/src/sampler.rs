@@ -63,6 +63,12 @@ pub trait Sampler: Send {
         false
     }
 
+    /// Whether it asks for further samples of pixels at rest ([`Canvas::samples`]) by itself. If not, the engine makes such of three in four
+    /// of its requests for them, and does not tell it what became of those: they say nothing of change.
+    fn refines(&self) -> bool {
+        false
+    }
+
     /// How fast each part of the picture changes, if the sampler learns it; reconstructions weigh samples with it.
     fn rates(&self) -> Option<&Rates> {
         None

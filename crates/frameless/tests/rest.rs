@@ -2,7 +2,7 @@
 
 mod world;
 
-use frameless::{Display, ReconstructionKind, ReprojectOptions, Request};
+use frameless::{Display, ReconstructionKind, ReprojectOptions, Request, SamplerKind};
 use world::*;
 
 const ANTIALIAS: ReconstructionKind = ReconstructionKind::Reproject(ReprojectOptions {
@@ -110,5 +110,38 @@ fn an_object_that_moves_through_noise_restarts_only_what_it_touches() {
         if distance > 8.0 + 3.0 {
             assert!(now >= then, "pixel {x} {y} began anew: {then} {now}");
         }
+    }
+}
+
+#[test]
+fn whoever_chooses_pixels_noise_is_averaged() {
+    const SAMPLES_PER_PIXEL: u32 = 64;
+    for kind in SamplerKind::ALL {
+        let world = World { noise: 0.6, ..world(STILL, NO_DISC) };
+        let rate = f64::from(SAMPLES_PER_PIXEL) * SIZE.pixels() as f64;
+        let mut engine = engine(world, ANTIALIAS, rate);
+        engine.set_sampler(kind.build(1));
+        let (picture, secs) = play(&mut engine, 60);
+        // With most samplers one look in four is at the first sample again, and some pixels get fewer than others.
+        let evenly = mean(&world, secs, SAMPLES_PER_PIXEL * 3 / 4);
+        let (ours, evenly) =
+            (rmse(&picture, &world.ideal(secs)), rmse(&evenly, &world.ideal(secs)));
+        assert!(ours < 1.25 * evenly, "{kind:?}: {ours}, evenly {evenly}");
+    }
+}
+
+#[test]
+fn whoever_chooses_pixels_what_jumps_leaves_nothing_behind() {
+    let disc = |secs: f64| [if secs < 2.01 { 30.0 } else { 50.0 }, 30.0, 14.3];
+    for kind in SamplerKind::ALL {
+        let world = world(STILL, disc);
+        let mut engine = engine(world, ANTIALIAS, 400_000.0);
+        engine.set_sampler(kind.build(1));
+        let (picture, secs) = play(&mut engine, 120);
+        let at_rest = rmse(&picture, &mean(&world, secs, 64));
+        assert!(at_rest < 1e-3, "{kind:?}: {at_rest}");
+        let (picture, secs) = play(&mut engine, 120);
+        let (_, most) = differences(&picture, &mean(&world, secs, 64));
+        assert!(most < 0.1, "{kind:?}: {most}");
     }
 }

@@ -123,6 +123,10 @@ impl Sampler for Timed {
         self.add(begin);
     }
 
+    fn refines(&self) -> bool {
+        self.sampler.refines()
+    }
+
     fn rates(&self) -> Option<&frameless::Rates> {
         self.sampler.rates()
     }

@@ -35,8 +35,8 @@ pub enum Told {
         notes: Vec<String>,
         /// What of the file was ignored.
         warnings: Vec<String>,
-        /// When it begins again; 0: nothing moves.
-        duration_secs: f64,
+        /// When it begins again; 0: nothing moves; `None`: nobody knows.
+        duration_secs: Option<f64>,
         /// Names of its cameras.
         cameras: Vec<String>,
     },

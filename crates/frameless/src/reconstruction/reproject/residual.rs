@@ -30,6 +30,9 @@ pub(super) const OUTDATED: f32 = 0.0025;
 /// Where rays differ, so many variances of the renderer's noise are no change.
 const NOISE: f32 = 4.0;
 
+/// What has changed a pixel by less (Σ over the channels) has not changed its neighbours by a step of 8 bits.
+const VISIBLE: f32 = 3.0 / (255.0 * 255.0);
+
 impl Reproject {
     /// What sample `i` of those kept found. Takes it up if its pixel is at rest.
     pub(super) fn residual(
@@ -54,7 +57,10 @@ impl Reproject {
             let change = squared(rgb, before);
             if self.settled.count(request.pixel) > 0 {
                 let (rgb, is_noisy) = (kept.new[i], kept.is_noisy);
-                self.settled.verify(request.pixel, rgb, change, display, is_noisy);
+                let begins = self.settled.verify(request.pixel, rgb, change, display, is_noisy);
+                if begins && change > VISIBLE {
+                    self.settled.begin_around(&self.store, &self.relight, [x, y], display);
+                }
             }
             return Found { change, outdated: change > 3.0 * OUTDATED, ..found };
         }

@@ -50,6 +50,8 @@ pub(super) struct Rest<'a> {
     pub(super) picture: &'a mut [[f32; 3]],
     /// Cells that take over their pixel's mean, and which.
     pub(super) handed_back: &'a mut Vec<(usize, [f32; 3])>,
+    /// Pixels whose sample at the centre has gone.
+    pub(super) left: &'a mut Vec<[u32; 2]>,
 }
 
 impl wide::Task for Rest<'_> {
@@ -145,11 +147,12 @@ impl Rest<'_> {
     fn end(&mut self, x: u32, y: u32) {
         let pixel = self.in_band(x, y);
         let count = std::mem::take(&mut self.means.count[pixel]);
-        if self.refresh.is_noisy
-            && count > 1
-            && let Some(cell) = self.store.central(x, y)
-        {
-            self.handed_back.push((cell, settle::mean(self.means.sum[pixel], count)));
+        match self.store.central(x, y) {
+            None => self.left.push([x, y]),
+            Some(cell) if self.refresh.is_noisy && count > 1 => {
+                self.handed_back.push((cell, settle::mean(self.means.sum[pixel], count)));
+            }
+            Some(_) => {}
         }
     }
 }

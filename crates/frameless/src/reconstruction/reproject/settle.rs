@@ -7,8 +7,9 @@
 //!
 //! A pixel is at rest while its sample lies at its centre and neither its object nor one beside it moves. The sample at the
 //! centre is kept apart: traced again, with the same random numbers, it is the same unless something has changed, however
-//! noisy the renderer is and whatever else the pixel's other samples see. Where it has changed the pixel, and no other, begins
-//! anew; a renderer with noise goes on with as many samples as are off by noise as much as by the change,
+//! noisy the renderer is and whatever else the pixel's other samples see. Where it has changed the pixel begins anew, and so do its
+//! neighbours: what has gone may have covered a part of them and not their centres. A renderer with noise goes on with as many samples
+//! as are off by noise as much as by the change,
 //!
 //! ```text
 //! n ← min(n, σ² / δ²)                  δ² the squared change of the sample at the centre
@@ -38,6 +39,8 @@ pub(super) struct Settled {
     moving: Vec<u8>,
     /// Scratch memory, of each band of rows: cells that take over their pixel's mean, and which.
     handed_back: Vec<Vec<(usize, [f32; 3])>>,
+    /// Scratch memory, of each band of rows: pixels whose sample at the centre has gone.
+    left: Vec<Vec<[u32; 2]>>,
     /// Object numbers that have moved since the last refresh.
     moved: Vec<bool>,
     sky_moved: bool,
@@ -162,7 +165,8 @@ impl Settled {
         Refinement { deviation, suspect }
     }
 
-    /// The sample at the centre has changed by `change` (Σ over the channels) to the linear `rgb`.
+    /// The sample at the centre has changed by `change` (Σ over the channels) to the linear `rgb`. Returns whether the pixel has begun
+    /// anew.
     pub(super) fn verify(
         &mut self,
         pixel: u32,
@@ -170,9 +174,9 @@ impl Settled {
         change: f32,
         display: &Display,
         is_noisy: bool,
-    ) {
+    ) -> bool {
         if change <= SAME {
-            return;
+            return false;
         }
         let pixel = pixel as usize;
         let n = self.count[pixel];
@@ -183,6 +187,7 @@ impl Settled {
         } else if as_good < n {
             self.keep_only(pixel, as_good);
         }
+        as_good <= 1
     }
 
     fn keep_only(&mut self, pixel: usize, count: u16) {
@@ -253,6 +258,7 @@ impl Settled {
         let rows = bands::rows(height, refresh.threads);
         let band = (rows * width) as usize;
         self.handed_back.resize_with(height.div_ceil(rows) as usize, Vec::new);
+        self.left.resize_with(height.div_ceil(rows) as usize, Vec::new);
         let chunks = self
             .count
             .chunks_mut(band)
@@ -260,17 +266,45 @@ impl Settled {
             .zip(self.spread.chunks_mut(band))
             .zip(self.encoded.chunks_mut(band))
             .zip(picture.chunks_mut(band))
-            .zip(&mut self.handed_back);
+            .zip(&mut self.handed_back)
+            .zip(&mut self.left);
         let (shown, moving) = (&*store, &*self.moving);
         let bands = chunks.enumerate().map(|(nth, chunks)| {
-            let (((((count, sum), spread), encoded), picture), handed_back) = chunks;
+            let ((((((count, sum), spread), encoded), picture), handed_back), left) = chunks;
             let means = Means { count, sum, spread, encoded };
             let first = nth * band;
-            Rest { store: shown, relight, refresh, moving, first, means, picture, handed_back }
+            let store = shown;
+            Rest { store, relight, refresh, moving, first, means, picture, handed_back, left }
         });
         bands::run(refresh.threads, bands.collect(), wide::run);
         for (cell, rgb) in self.handed_back.iter_mut().flat_map(|cells| cells.drain(..)) {
             store.recolour(cell, rgb, refresh.display);
+        }
+        let mut left = std::mem::take(&mut self.left);
+        for [x, y] in left.iter_mut().flat_map(|pixels| pixels.drain(..)) {
+            self.begin_around(store, relight, [x, y], refresh.display);
+        }
+        self.left = left;
+    }
+
+    /// The pixels beside one whose sample at the centre has changed or gone begin anew.
+    pub(super) fn begin_around(
+        &mut self,
+        store: &Store,
+        relight: &Relight,
+        [x, y]: [u32; 2],
+        display: &Display,
+    ) {
+        let Size { width, height } = store.layout.size;
+        for y in y.saturating_sub(1)..(y + 2).min(height) {
+            for x in x.saturating_sub(1)..(x + 2).min(width) {
+                let pixel = store.layout.size.index(x, y);
+                if self.count(pixel) > 1
+                    && let Some(cell) = store.central(x, y)
+                {
+                    self.begin(pixel as usize, relight.linear(store, cell), display);
+                }
+            }
         }
     }
 

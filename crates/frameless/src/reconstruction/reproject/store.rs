@@ -101,6 +101,7 @@ impl Shade {
 }
 
 impl Sample {
+    #[inline(always)]
     pub(super) fn new(kept: &Kept<'_>, i: usize, display: &Display) -> Sample {
         let (object, anchor) = match kept.surfaces.get(i) {
             Some(surface) => (surface.object, Anchor::new(surface)),

@@ -340,6 +340,10 @@ impl Sampler for Adaptive {
         }
     }
 
+    fn refines(&self) -> bool {
+        true
+    }
+
     fn wants_motion(&self) -> bool {
         self.weights.flow != 0.0
     }
