@@ -40,7 +40,7 @@ const CALM_AFTER: Duration = Duration::from_secs(1);
 /// After somebody has done something, pictures come as fast as they can for so long.
 const HURRIED_FOR: Duration = Duration::from_millis(300);
 /// What moves by itself takes so much of each client's link, as long as that leaves 20 pictures per second.
-const UNHURRIED_BYTES_PER_SEC: f64 = 450e3;
+const UNHURRIED_BYTES_PER_SEC: f64 = 600e3;
 const LONGEST_UNHURRIED: Duration = Duration::from_millis(50);
 /// A client that is told why it may not act is not told again for so long.
 const BETWEEN_REFUSALS: Duration = Duration::from_secs(2);

@@ -61,10 +61,15 @@ fn get(host: &str, path: &str) -> String {
 fn one_address_is_printed_and_it_opens_the_page() {
     let serving = Serving::start(&["serve", "--port", "0", "--size", "64x48"]);
     let (host, key) = serving.address();
+    let key = key.to_owned();
     assert_eq!(key.len(), 64);
     assert!(get(host, &format!("/?key={key}")).contains("200 OK"));
-    assert!(get(host, "/").contains("403 Forbidden"));
-    assert_eq!(serving.end(), "");
+    for _ in 0..3 {
+        assert!(get(host, "/").contains("403 Forbidden"));
+    }
+    let said = serving.end();
+    assert_eq!(said.lines().count(), 1, "a line in ten seconds: {said}");
+    assert!(said.contains("turned away") && !said.contains(&key), "{said}");
 }
 
 #[test]

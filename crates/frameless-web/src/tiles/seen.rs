@@ -351,7 +351,7 @@ mod tests {
         send(&mut seen, &shown, 1, PLENTY);
         send(&mut seen, &shown, 500, PLENTY);
         // A slow fade, each step of which is far less than is worth sending anywhere else.
-        scene.rgba.iter_mut().for_each(|[r, g, b, _]| (*r, *g, *b) = (*r + 1, *g + 1, *b + 1));
+        scene.rgba.iter_mut().for_each(|[r, g, b, _]| (*r, *g, *b) = (*r + 2, *g + 2, *b + 2));
         let faded = send(&mut seen, &scene.show(), 1000, PLENTY);
         assert_eq!((faded.tiles, faded.lossless), (vec![0, 1, 2], false));
     }

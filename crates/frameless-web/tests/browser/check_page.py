@@ -429,6 +429,7 @@ def says_why_it_cannot_come_back(bench: Bench) -> str:
         said = set(view.page.evaluate("texts"))
         assert len(said) == 1, said
         view.page.goto(other.url)
+        view.page.wait_for_url(lambda now: "key=" not in now)
         view.live()
         refusals = other.stderr().count("was turned away")
     # One that has no room: whatever the page's WebSocket is told, the page is not.
