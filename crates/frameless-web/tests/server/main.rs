@@ -3,5 +3,6 @@
 mod clients;
 mod door;
 mod hostile;
+mod rest;
 mod stream;
 mod support;

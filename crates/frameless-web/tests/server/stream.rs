@@ -254,25 +254,3 @@ fn a_recording_goes_on_where_there_is_no_client() {
         std::thread::sleep(Duration::from_millis(20));
     }
 }
-
-#[test]
-fn nothing_is_traced_while_nobody_looks_and_everything_is_there_again_at_once() {
-    let running = start(Options { rests_after: Duration::from_millis(200), ..options() });
-    // The rate is that of the time since the picture before.
-    let status_after = |picture| {
-        Client::connect(&running).until("a status", |_, received| match received {
-            Received::Status(status) => {
-                (status.picture > picture && status.samples_per_sec > 0.0).then_some(*status)
-            }
-            _ => None,
-        })
-    };
-    let before = status_after(20);
-    std::thread::sleep(Duration::from_secs(3));
-    let begin = Instant::now();
-    let after = status_after(before.picture + 1);
-    assert!(begin.elapsed() < Duration::from_secs(5), "{:?}", begin.elapsed());
-    assert!(after.unknown < 0.1, "what was traced has been kept: {}", after.unknown);
-    let [before, after] = [before, after].map(|status| status.samples_per_sec);
-    assert!(after < before / 3.0, "{before} samples/s, then {after} while nobody looked");
-}

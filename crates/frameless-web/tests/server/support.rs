@@ -8,10 +8,10 @@ use std::time::{Duration, Instant};
 
 use frameless::{Clock, Size};
 use frameless_scene::{Limits, Scene, builtin};
-use frameless_session::{Helm, PictureSize, Session, Settings};
+use frameless_session::{Helm, PictureSize, Session, Settings, Stage};
 use frameless_trace::{CpuTracer, ViewSource, World};
 use frameless_web::wire::{Ack, StatusMessage, TilesHeader};
-use frameless_web::{Options, Scenes, Server, Show, Stopper};
+use frameless_web::{Options, Prepare, Scenes, Server, Show, Stopper};
 use image::RgbImage;
 use serde_json::Value;
 use tokio_tungstenite::tungstenite::client::IntoClientRequest;
@@ -36,20 +36,30 @@ pub(crate) fn start(options: Options) -> Running {
 }
 
 pub(crate) fn start_at(options: Options, size: Size) -> Running {
+    let scene = Arc::new(builtin("sphere").expect("built in"));
+    let prepare = |scene: &Arc<Scene>| Arc::new(World::new(Arc::clone(scene)));
+    let tracing = frameless_trace::Settings::default();
+    let tracer = CpuTracer::new(prepare(&scene), ViewSource::Camera(0), tracing, 1);
+    start_with(options, size, tracer, Some(Arc::new(prepare)))
+}
+
+/// Any renderer; without `prepare` it takes no other scenes.
+pub(crate) fn start_with<S: Stage + Send + 'static>(
+    options: Options,
+    size: Size,
+    stage: S,
+    prepare: Option<Prepare<S::World>>,
+) -> Running {
     let server = Server::bind(options).unwrap();
     let address = server.address();
     let url = server.url();
     let key = url.rsplit_once("?key=").expect("the address holds the key").1.to_owned();
     let stopper = server.stopper();
-    let scene = Arc::new(builtin("sphere").expect("built in"));
-    let prepare = |scene: &Arc<Scene>| Arc::new(World::new(Arc::clone(scene)));
-    let tracing = frameless_trace::Settings::default();
-    let tracer = CpuTracer::new(prepare(&scene), ViewSource::Camera(0), tracing, 1);
     let settings = Settings { picture: PictureSize::Fixed(size), ..Settings::default() };
     let show = Show {
-        session: Session::new(size, Clock::real(), settings, 1, tracer),
-        helm: Helm::new(scene),
-        scenes: Some(Scenes { limits: Limits::default(), prepare: Arc::new(prepare) }),
+        session: Session::new(size, Clock::real(), settings, 1, stage),
+        helm: Helm::new(Arc::new(builtin("sphere").expect("built in"))),
+        scenes: prepare.map(|prepare| Scenes { limits: Limits::default(), prepare }),
     };
     let thread = std::thread::spawn(move || server.run(show));
     Running { address, key, stopper, thread: Some(thread) }
