@@ -17,6 +17,8 @@ pub struct Pace {
     // Until when the samples would have the loop for themselves if nothing were on credit.
     owed_until: Time,
     paint_secs: f64,
+    refresh_secs: f64,
+    is_hurried: bool,
 }
 
 // A little less than 1/60 s: where the display waits for its refresh, that sets the rate and not this.
@@ -33,6 +35,8 @@ const HURRIED_SHARE: f64 = 0.5;
 const CREDIT_SECS: f64 = 0.04;
 // Whatever a picture costs, the next comes after this at the latest.
 const LONGEST_REST_SECS: f64 = 1.0;
+// Samples that come later than this are old before they are shown.
+const MOST_AHEAD_SECS: f64 = 0.015;
 // Of the newest paint in the learned cost: one slow paint is no reason to slow down.
 const LEARNING_RATE: f64 = 0.1;
 
@@ -47,6 +51,8 @@ impl Pace {
     /// Told when a picture is ready, and what making it cost in seconds of the render loop. The samples get their share before
     /// the next one: at once and not on average, since the first pictures of a large window cost most.
     pub fn made(&mut self, now: Time, refresh_secs: f64) {
+        self.refresh_secs = refresh_secs;
+        self.is_hurried = false;
         let rested = |from: Time, share: f64| {
             let rest_secs = refresh_secs * (1.0 / share - 1.0);
             Time::from_secs(from.secs() + rest_secs.min(LONGEST_REST_SECS))
@@ -62,6 +68,13 @@ impl Pace {
     /// Told when somebody has done something: the next picture shows it, and may come a little earlier than it would.
     pub fn hurry(&mut self) {
         self.due = self.due.min(self.soonest);
+        self.is_hurried = true;
+    }
+
+    /// For how many seconds the renderer should have something to do while the next picture is made: as long as the last one took; if
+    /// somebody waits for it, not at all.
+    pub fn ahead_secs(&self) -> f64 {
+        if self.is_hurried { 0.0 } else { self.refresh_secs.min(MOST_AHEAD_SECS) }
     }
 
     /// Whether a picture is due; if so, the next one is due an interval later.
@@ -173,5 +186,17 @@ mod tests {
         let mut pace = Pace::default();
         pace.made(Time::ZERO, 60.0);
         assert!(pace.is_due(Time::from_secs(LONGEST_REST_SECS)));
+    }
+
+    #[test]
+    fn the_renderer_has_work_while_a_picture_is_made_that_nobody_waits_for() {
+        let mut pace = Pace::default();
+        assert_eq!(pace.ahead_secs(), 0.0, "nobody knows how long it will take");
+        pace.made(ms(1000), 0.008);
+        assert_eq!(pace.ahead_secs(), 0.008);
+        pace.hurry();
+        assert_eq!(pace.ahead_secs(), 0.0, "whose answer must not wait for others");
+        pace.made(ms(1050), 3.0);
+        assert_eq!(pace.ahead_secs(), MOST_AHEAD_SECS);
     }
 }

@@ -176,6 +176,11 @@ impl<S: Stage> Session<S> {
         }
     }
 
+    /// See [`Engine::work_ahead`].
+    pub fn work_ahead(&mut self, secs: f64) {
+        self.engine.work_ahead(secs);
+    }
+
     /// See [`Stage::trouble`].
     pub fn trouble(&mut self) -> Option<String> {
         self.engine.tracer_mut().tracer.trouble()

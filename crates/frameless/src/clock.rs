@@ -71,6 +71,14 @@ impl Clock {
         }
     }
 
+    /// Samples that the renderer traces in a batch's time.
+    pub(crate) fn batch_length(&self) -> usize {
+        match self {
+            Clock::Simulated(_) => 0,
+            Clock::Real(clock) => clock.batch_length(),
+        }
+    }
+
     /// Real clock: do nothing for about half a batch; called when nothing is due.
     pub(crate) fn rest(&self) {
         if let Clock::Real(_) = self {
@@ -179,6 +187,17 @@ impl Real {
             self.samples_per_sec += LEARNING_RATE * (measured - self.samples_per_sec);
         }
         self.last_answer = busy.then_some(now);
+    }
+
+    /// Whether the renderer may be given more than it is awaited for. The time until the next answer says nothing of how fast it is.
+    pub(crate) fn works_ahead(&mut self) -> bool {
+        self.last_answer = None;
+        self.length.is_none()
+    }
+
+    /// How many samples the renderer traces in so many seconds.
+    pub(crate) fn samples_in(&self, secs: f64) -> usize {
+        (self.samples_per_sec * secs) as usize
     }
 
     /// Samples in a batch that lasts as long as it should.

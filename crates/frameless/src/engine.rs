@@ -200,8 +200,28 @@ impl<T: Tracer> Engine<T> {
             return Ok(0);
         }
         let kept = self.collect_one()?.unwrap_or(0);
-        self.clock.answered(kept, self.outstanding > 0);
+        // What was worked ahead has come while nobody waited for it.
+        let is_waited_for = self.outstanding <= PIPELINE_DEPTH * self.clock.batch_length();
+        self.clock.answered(kept, self.outstanding > 0 && is_waited_for);
         Ok(kept)
+    }
+
+    /// Real clock, renderers that work by themselves: enough to do for so many seconds in which [`Engine::step`] will not be called, as
+    /// while a picture is made.
+    pub fn work_ahead(&mut self, secs: f64) {
+        while let Clock::Real(clock) = &mut self.clock
+            && clock.works_ahead()
+        {
+            let batch = clock.batch_length();
+            if self.outstanding >= clock.samples_in(secs) + PIPELINE_DEPTH * batch {
+                return;
+            }
+            let (now, count) = clock.next_batch(batch);
+            if count == 0 {
+                return;
+            }
+            self.choose_and_submit(now, count);
+        }
     }
 
     /// One batch, awaited, for a renderer whose calls have a price.
