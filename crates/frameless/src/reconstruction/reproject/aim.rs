@@ -10,11 +10,16 @@ const AROUND: [[i32; 2]; 8] = [[3, 0], [-3, 0], [0, 3], [0, -3], [6, 0], [-6, 0]
 /// Faster surfaces (pixels per refresh) are not aimed at.
 const FASTEST_PX: f32 = 200.0;
 
+/// A pixel that has shown the same for longer is looked at where it is: aimed elsewhere again and again, it would never change.
+const UNAIMED_AFTER_SECS: f64 = 0.5;
+
 impl Reproject {
-    pub(super) fn aim_one(&self, now: Time, request: &mut Request) {
+    /// `shown_since`: when what the pixel shows was traced.
+    pub(super) fn aim_one(&self, now: Time, shown_since: &[Time], request: &mut Request) {
         let size = self.store.layout.size;
         let Some(motion) = self.motion(request.pixel) else { return };
-        if motion == [0.0; 2] {
+        let is_old = || now.secs_since(shown_since[request.pixel as usize]) > UNAIMED_AFTER_SECS;
+        if motion == [0.0; 2] || is_old() {
             return;
         }
         // How much of the motion from refresh to refresh is still to come; nothing after two refreshes at one time, between which

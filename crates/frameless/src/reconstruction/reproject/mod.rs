@@ -186,7 +186,7 @@ impl Reconstruction for Reproject {
             for i in 0..requests.len() {
                 self.prefetch_motion(requests, i);
                 if requests[i].sample_index == 0 {
-                    self.aim_one(now, &mut requests[i]);
+                    self.aim_one(now, canvas.time(), &mut requests[i]);
                 }
             }
         }
