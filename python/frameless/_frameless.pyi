@@ -42,7 +42,7 @@ class _DLPack(Protocol):
 
 _Array: TypeAlias = NDArray[Any] | _DLPack
 _Floats32: TypeAlias = NDArray[np.float32]
-_Triple: TypeAlias = Sequence[float]
+_Triple: TypeAlias = Sequence[float] | NDArray[Any]
 
 @final
 class Camera:
@@ -243,7 +243,7 @@ class Scene:
     def render(
         self, size: tuple[int, int], time: float = 0.0, camera: Camera | int | None = None
     ) -> _Floats32: ...
-    def __call__(self, x: _Array, y: _Array, time: float, camera: Camera) -> Samples: ...
+    def __call__(self, x: _Array, y: _Array, time: float, camera: Camera | None) -> Samples: ...
 
 @final
 class Served:
@@ -272,7 +272,7 @@ def start_serving(
     exposure: float,
     noisy: bool,
     port: int,
-    allow_frame: str,
+    allow_frame: str | None,
 ) -> Served: ...
 def loop_without_python(
     size: tuple[int, int], sampler: str, reconstruction: str, batch: int, seconds: float

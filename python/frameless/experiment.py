@@ -82,6 +82,9 @@ def compare(
     if isinstance(algorithms, str):
         raise TypeError(f"algorithms: wanted a list of names and pairs, got {algorithms!r}; write [{algorithms!r}]")
     named, custom = _split(list(algorithms))
+    last, first = _positive("seconds", seconds), _number("unscored", unscored)
+    if last <= first:
+        raise ValueError(f"seconds: wanted more than the {first} s of unscored, got {last}")
     lines = [
         'title = "compare"',
         # A file names at least one algorithm.
@@ -91,8 +94,8 @@ def compare(
         f"width = {width}",
         f"height = {height}",
         f"display_hz = {_whole('display_hz', display_hz, least=1)}",
-        f"duration_secs = {_toml(_positive('seconds', seconds))}",
-        f"unscored_secs = {_toml(_number('unscored', unscored))}",
+        f"duration_secs = {_toml(last)}",
+        f"unscored_secs = {_toml(first)}",
     ]
     for scene in _several("scenes", scenes, _scene):
         lines += ["[[scenes]]", f"scene = {_toml(scene)}"]
@@ -135,6 +138,9 @@ def _split(algorithms: list[Algorithm]) -> tuple[list[str], list[_Custom]]:
         if not callable(factory):
             raise TypeError(f"algorithm {name!r}: wanted what makes a sampler of a seed, got {factory!r}")
         custom.append((name, name.partition("+")[2] or "hold", factory))
+    names = named + [name for name, _, _ in custom]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise ValueError(f"algorithms: wanted each name once, got {twice!r} twice")
     return named, custom
 
 
@@ -170,19 +176,24 @@ def _whole(name: str, given: Any, least: int = 0) -> int:
     return number
 
 
-def _number(name: str, given: Any) -> float:
+def _float(name: str, given: Any) -> float:
     try:
-        number = float(given)
+        return float(given)
     except (TypeError, ValueError):
         raise TypeError(f"{name}: wanted a number, got {given!r}") from None
+
+
+def _number(name: str, given: Any) -> float:
+    number = _float(name, given)
     if not 0.0 <= number < math.inf:
         raise ValueError(f"{name}: wanted a finite number of at least 0, got {number}")
     return number
 
 
 def _positive(name: str, given: Any) -> float:
-    if (number := _number(name, given)) == 0.0:
-        raise ValueError(f"{name}: wanted a number above 0, got {number}")
+    number = _float(name, given)
+    if not 0.0 < number < math.inf:
+        raise ValueError(f"{name}: wanted a finite number above 0, got {number}")
     return number
 
 

@@ -63,12 +63,12 @@ def picture(image: NDArray[Any], ax: "Axes | None" = None, title: str = "") -> "
 
 
 def age(seconds: NDArray[Any], ax: "Axes | None" = None) -> "Axes":
-    """``Session.age()`` as a map; black where nothing is known."""
+    """``Session.age()`` as a map; grey where nothing is known."""
     return _map(np.where(np.isfinite(seconds), seconds, np.nan), "age (s)", ax)
 
 
 def change(d: NDArray[Any], ax: "Axes | None" = None) -> "Axes":
-    """``Session.change()`` as a map of log10 d; black where nothing is known."""
+    """``Session.change()`` as a map of log10 d; grey where nothing is known."""
     with np.errstate(divide="ignore"):
         return _map(np.log10(np.maximum(d, 1e-6)), "log10 of change d", ax)
 
@@ -82,7 +82,7 @@ def probability(p: NDArray[Any] | None, ax: "Axes | None" = None) -> "Axes":
 
 def _map(values: NDArray[Any], label: str, ax: "Axes | None") -> "Axes":
     ax = _axes(ax)
-    ax.set_facecolor("black")
+    ax.set_facecolor("0.6")
     shown = ax.imshow(values, cmap="inferno", interpolation="nearest")
     figure = ax.get_figure()
     if figure is not None:

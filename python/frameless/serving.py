@@ -28,16 +28,18 @@ def serve(
     exposure: float = 0.0,
     noisy: bool = False,
     port: int = 0,
-    allow_frame: str = "http://localhost:*",
+    allow_frame: str | None = "http://localhost:*",
 ) -> Served:
     """Show a renderer on a web page of this machine, and return at once. The last line of a notebook's cell shows it inline.
+
+    The page is there until its `stop` is called, or the program ends; while nobody looks at it nothing is traced.
 
     Parameters:
 
     - `render`: a function `render(x, y, time, camera)`, called in a thread of its own, with the interpreter held, about every `batch_ms`.
         x and y are float32 arrays of shape (n,), pixels from the picture's top-left corner; time is in seconds; `camera.rays(x, y)` are the rays
         through them. It returns linear RGB of shape (n, 3), or Samples
-    - `size`: (width, height) of the picture in pixels
+    - `size`: (width, height) of the picture in pixels, at most 3840 · 2160 of them
     - `camera`: from where it is looked at first; dragging on the page moves it
     - `sampler`, `reconstruction`: as in Session. On the page another may be chosen; a sampler that is no name is there called `own`
     - `batch_ms`: milliseconds that a call of `render` should take; longer if calls are expensive
@@ -46,7 +48,7 @@ def serve(
     - `noisy`: whether colours have noise; it is then called as `render(x, y, time, camera, seed)`, seed being uint32 of shape (n,), and
         makes its random numbers from that alone
     - `port`: where the page listens, on this machine only; default: any free port
-    - `allow_frame`: origin of the pages that may show this one inside them, as notebooks do. Default: those that are reached under the
+    - `allow_frame`: origin of the pages that may show this one inside them, as notebooks do; None: no page may. Default: those that are reached under the
         name localhost, at any port. A notebook opened as 127.0.0.1 or elsewhere shows no page inline; open `url` then
 
     Raises OSError if the port is taken, ValueError for values that make no sense, TypeError for what is no function or no sampler.
@@ -74,14 +76,32 @@ def view(
     size: tuple[int, int] = (640, 480),
     *,
     camera: Camera = DEFAULT_CAMERA,
+    sampler: str | BuiltinSampler | Sampler = "adaptive",
+    reconstruction: str = "reproject+antialias",
+    batch_ms: float = 4.0,
+    budget: float | None = None,
+    exposure: float = 0.0,
+    noisy: bool = False,
+    port: int = 0,
     open_browser: bool = True,
-    **options: Any,
 ) -> None:
     """Look at a renderer in the browser until Ctrl-C.
 
-    As `serve` (whose other parameters it takes), but opens the page, and waits. What render raises is raised here.
+    As `serve`, whose parameters these are, but opens the page (if `open_browser`), and waits. What render raises is raised here.
     """
-    served = serve(render, size, camera=camera, **options)
+    served = serve(
+        render,
+        size,
+        camera=camera,
+        sampler=sampler,
+        reconstruction=reconstruction,
+        batch_ms=batch_ms,
+        budget=budget,
+        exposure=exposure,
+        noisy=noisy,
+        port=port,
+        allow_frame=None,
+    )
     print(f"look at it here: {served.url}    (Ctrl-C ends it)", flush=True)
     if open_browser:
         import webbrowser

@@ -25,6 +25,7 @@ def check_sampler(make: Factory, *, every_pixel_within: float = 2.0) -> None:
     check_floor(make)
     check_seeds(make)
     check_resize(make)
+    check_probability(make)
 
 
 def still(x: NDArray[Any], y: NDArray[Any], time: float, camera: object) -> NDArray[Any]:
@@ -88,3 +89,13 @@ def check_resize(make: Factory) -> None:
         session.resize(size)
         kept = session.run(still, 0.3)
         _require(kept > 0, f"nothing was traced after a resize to {size}")
+
+
+def check_probability(make: Factory) -> None:
+    """If it tells probabilities, they are one per pixel, and sum to 1."""
+    session = _session(make(1), 20_000.0)
+    session.run(flickering, 0.2)
+    try:
+        session.probability()
+    except (TypeError, ValueError) as error:
+        raise AssertionError(str(error)) from error

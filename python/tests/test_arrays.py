@@ -170,3 +170,44 @@ def test_a_picture_of_one_pixel() -> None:
             if count == 5:
                 break
         assert session.image().shape == (1, 1, 3)
+
+
+def test_numbers_that_no_sample_can_have_do_not_wrap() -> None:
+    huge = np.full(N, 2**64 - 1, np.uint64)
+    for arguments in ({"position": np.zeros((N, 3)), "object_id": huge}, {"where": huge}):
+        with pytest.raises(ValueError, match="18446744073709551615"):
+            batch().submit(RGB, **arguments)
+
+
+def test_ctrl_c_in_another_library_is_no_value_error() -> None:
+    class Interrupted(Foreign):
+        def __dlpack__(self, *args: Any, **kwargs: Any) -> Any:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        batch().submit(Interrupted(RGB))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ({"eye": (1, 2)}, r"eye: wanted three finite numbers, got \(1, 2\)"),
+        ({"target": "abc"}, "target: wanted three finite numbers, got 'abc'"),
+        ({"up": (0, np.inf, 0)}, "up: wanted three finite numbers"),
+    ],
+)
+def test_points_are_checked(arguments: dict[str, Any], says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        frameless.Camera(**{"eye": np.zeros(3), "target": [0, 0, 1], **arguments})
+
+
+def test_a_camera_says_all_that_it_is() -> None:
+    camera = frameless.Camera((0, 0, 5), (0, 0, 0), up=(1, 0, 0), fov=30).with_size((64, 48))
+    assert eval(repr(camera), {"Camera": frameless.Camera}).rays(RGB[:, 0], RGB[:, 1])[1] == pytest.approx(
+        camera.rays(RGB[:, 0], RGB[:, 1])[1], abs=1e-6
+    )
+
+
+def test_a_scene_without_a_camera_says_what_to_do() -> None:
+    with pytest.raises(ValueError, match=r"Session\(size, camera=scene.camera\(\)\)"):
+        frameless.Session((8, 6)).run(frameless.Scene.builtin("sphere"), 0.1)

@@ -75,7 +75,7 @@ def test_no_sample_is_answered_twice(session: frameless.Session) -> None:
     batch.submit(np.ones((2, 3)), where=np.array([5, 7]))
     with pytest.raises(ValueError, match=r"sample 5 of batch 0 has been answered already"):
         batch.submit(np.ones((100, 3)))
-    with pytest.raises(ValueError, match="sample 9 .* already"):
+    with pytest.raises(ValueError, match="where: wanted each sample once, got sample 9 twice"):
         batch.submit(np.ones((2, 3)), where=np.array([9, 9]))
     assert batch.submit(np.ones((98, 3)), where=np.delete(np.arange(100), [5, 7])) == 98
 
@@ -302,6 +302,40 @@ def test_nonsense_is_refused_with_what_came(arguments: dict[str, object], says: 
     with pytest.raises(ValueError) as refused:
         frameless.Session(**{"size": (4, 4), **arguments})  # type: ignore[arg-type]
     assert says in str(refused.value)
+
+
+@pytest.mark.parametrize("sampler", ["change", "adaptive", "permutation", "random"])
+def test_answers_to_a_canvas_that_had_the_same_size_are_dropped(sampler: str) -> None:
+    session = frameless.Session((30, 20), sampler=sampler, batch=50)
+    first = next(iter(session))
+    session.resize((10, 10))
+    next(iter(session))
+    session.resize((30, 20))
+    assert first.submit(np.ones((len(first), 3))) == 0 and session.counters["dropped"] == len(first)
+    assert session.run(pattern, 0.05) > 0
+
+
+def test_parts_name_a_sample_once(session: frameless.Session) -> None:
+    batch = next(iter(session))
+    with pytest.raises(ValueError, match="where: wanted each sample once, got sample 3 twice"):
+        batch.submit(np.zeros((2, 3)), where=np.array([3, 3]))
+    assert batch.submit(np.zeros((len(batch), 3))) == len(batch)
+
+
+def test_another_seed_makes_another_noise() -> None:
+    def seeds(seed: int) -> dict[int, int]:
+        batch = next(iter(frameless.Session((40, 30), seed=seed, batch=200, sampler="permutation", noisy=True)))
+        return dict(zip(batch.pixel.tolist(), batch.seed.tolist()))
+
+    one, again, other = seeds(1), seeds(1), seeds(2)
+    assert one == again
+    both = one.keys() & other.keys()
+    assert both and all(one[pixel] != other[pixel] for pixel in both)
+
+
+@pytest.mark.parametrize("size", [[40, 30], np.array([40, 30])])
+def test_sizes_may_be_any_pair(size: Any) -> None:
+    assert frameless.Session(size).size == (40, 30)
 
 
 @pytest.mark.parametrize("size", [7, (1, 2, 3), ("4", "4"), (4.5, 4)])

@@ -127,6 +127,11 @@ LONG = {
         "scene(x, x, 0.0, scene.camera().with_size((640, 480)))"
     ),
     "a large picture": "session = frameless.Session((8000, 4000)); [session.image() for _ in range(99)]",
+    "a large picture, with": "with frameless.Session((8000, 4000)) as session:\n        while True: session.image()",
+    "batches of a large picture, with": (
+        "with frameless.Session((8000, 4000)) as session:\n"
+        "        for batch in session: batch.submit(numpy.zeros((len(batch), 3)))"
+    ),
     "the first batch of a large picture": "[list(frameless.Session((8000, 8000)).batches(0.1)) for _ in range(99)]",
 }
 

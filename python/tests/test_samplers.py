@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import threading
 from functools import partial
 from typing import Any
 
@@ -218,8 +219,46 @@ def test_what_is_no_sampler_is_refused(sampler: Any) -> None:
 
 def test_a_class_is_no_sampler_yet() -> None:
     forgotten: Any = Uniform
-    with pytest.raises(TypeError):
-        next(iter(Session((4, 4), sampler=forgotten)))
+    with pytest.raises(TypeError, match="wanted a name or an object .* got <class"):
+        Session((4, 4), sampler=forgotten)
+
+
+def test_what_a_sampler_raises_goes_to_who_has_asked() -> None:
+    asked, told = threading.Event(), threading.Event()
+
+    class Late(Uniform):
+        def choose(self, now: float, canvas: CanvasLike, count: int) -> Any:
+            asked.set()
+            told.wait(0.2)
+            raise KeyError("late")
+
+    session = Session((40, 30), sampler=Late(1), batch=10)
+    others: list[BaseException] = []
+
+    def look() -> None:
+        asked.wait(10.0)
+        try:
+            for _ in range(200):
+                session.now  # noqa: B018
+        except BaseException as error:
+            others.append(error)
+
+    thread = threading.Thread(target=look)
+    thread.start()
+    with pytest.raises(KeyError, match="late"):
+        session.run(pattern, 1.0)
+    told.set()
+    thread.join(10.0)
+    assert not others
+
+
+def test_probabilities_are_part_of_the_check() -> None:
+    class Knowing(Uniform):
+        def probability(self, now: float, canvas: CanvasLike) -> Any:
+            return np.ones((3, 3))
+
+    with pytest.raises(AssertionError, match="wanted shape"):
+        testing.check_sampler(Knowing)
 
 
 @pytest.mark.parametrize("name", BUILTIN)

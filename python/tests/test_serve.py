@@ -1,5 +1,6 @@
 """A renderer on a page: it answers, it stops, and what the renderer raises is not lost."""
 
+import os
 import subprocess
 import sys
 import time
@@ -138,6 +139,51 @@ def test_a_failure_that_nobody_waits_for_is_written_down(capfd: pytest.CaptureFi
         served.stop()
 
 
+def test_a_sampler_that_fails_on_a_page_is_written_down(capfd: pytest.CaptureFixture[str]) -> None:
+    class Failing:
+        def choose(self, now: float, canvas: frameless.CanvasLike, count: int) -> Any:
+            raise LookupError("no pixels")
+
+    served = serve(pattern, (32, 24), sampler=Failing())
+    wait_for(lambda: served.failed)
+    time.sleep(0.1)
+    assert "LookupError: no pixels" in capfd.readouterr().err
+    with pytest.raises(LookupError):
+        served.stop()
+
+
+def test_a_renderer_may_stop_another_page_and_waits_for_it() -> None:
+    other = serve(pattern, (32, 24))
+    seen: list[bool] = []
+
+    def render(x: Any, *_: object) -> Any:
+        if not seen:
+            other.stop()
+            seen.append(other.running)
+        return np.zeros((len(x), 3))
+
+    served = serve(render, (32, 24))
+    wait_for(lambda: seen)
+    served.stop()
+    assert seen == [False]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded")
+def test_a_forked_process_does_not_wait_for_pages_that_it_has_not() -> None:
+    code = (
+        "import os, sys, numpy as np, frameless\n"
+        "page = frameless.serve(lambda x, y, t, c: np.zeros((len(x), 3)), (32, 24))\n"
+        "child = os.fork()\n"
+        "if child == 0:\n"
+        "    page.stop()\n"
+        "    sys.exit(7)\n"
+        "status = os.waitpid(child, 0)[1]\n"
+        "sys.exit(os.waitstatus_to_exitcode(status))\n"
+    )
+    assert subprocess.run([sys.executable, "-W", "ignore", "-c", code], timeout=60).returncode == 7
+
+
 def test_a_page_takes_samplers_of_all_kinds(capfd: pytest.CaptureFixture[str]) -> None:
     asked = []
 
@@ -192,12 +238,13 @@ def test_view_raises_what_render_raises(monkeypatch: pytest.MonkeyPatch, capsys:
         ({"exposure": 65.0}, "from -64 to 64 stops, got 65"),
         ({"port": 70_000}, "port: wanted a whole number from 0 to 65535"),
         ({"port": -1}, "port"),
+        ({"size": (5000, 3000)}, "at most 8294400 pixels on a page, got 5000×3000"),
+        ({"allow_frame": "*"}, "allow_frame: \\*: wanted one origin"),
     ],
 )
 def test_nonsense_is_refused(arguments: dict[str, Any], says: str) -> None:
-    with pytest.raises(ValueError) as refused:
+    with pytest.raises(ValueError, match=says):
         serve(**{"render": pattern, "size": (32, 24), **arguments})
-    assert says in str(refused.value)
 
 
 @pytest.mark.parametrize(

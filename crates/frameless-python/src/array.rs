@@ -6,7 +6,7 @@ use numpy::{
     Element, PyArray1, PyArray2, PyArray3, PyArrayDescrMethods, PyReadonlyArray1, PyReadonlyArray2,
     PyUntypedArray, dtype,
 };
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyException, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 /// Says of which sample a bad value is: sample number → words.
@@ -25,6 +25,10 @@ fn array<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUn
     }
     let numpy = value.py().import("numpy")?;
     let array = numpy.call_method1("from_dlpack", (value,)).map_err(|cause| {
+        if !cause.is_instance_of::<PyException>(value.py()) {
+            // Ctrl-C, or the end of the program.
+            return cause;
+        }
         let error = PyValueError::new_err(format!(
             "{name}: this {kind} cannot be read as an array in the machine's memory: {cause}; \
              detach it and move it to the CPU first"
@@ -162,8 +166,41 @@ pub(crate) fn picture(name: &str, value: &Bound<'_, PyAny>) -> PyResult<(Size, V
     Ok((size, triples))
 }
 
-/// `n` floats, finite: shape (n,), float32 or float64.
+/// Floats, finite: shape (n,), float32 or float64.
 pub(crate) fn floats(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f32>> {
+    let floats = any_floats(name, value)?;
+    match floats.iter().position(|x| !x.is_finite()) {
+        None => Ok(floats),
+        Some(bad) => Err(PyValueError::new_err(format!(
+            "{name}: wanted finite numbers that fit float32, got {} at index {bad}",
+            floats[bad]
+        ))),
+    }
+}
+
+/// Places in a picture: as many x as y.
+pub(crate) fn places(x: &Bound<'_, PyAny>, y: &Bound<'_, PyAny>) -> PyResult<Vec<[f32; 2]>> {
+    let (x, y) = (floats("x", x)?, floats("y", y)?);
+    if x.len() != y.len() {
+        let message = format!("y: wanted shape ({},) like x, got ({},)", x.len(), y.len());
+        return Err(PyValueError::new_err(message));
+    }
+    Ok(x.into_iter().zip(y).map(|(x, y)| [x, y]).collect())
+}
+
+/// Three finite numbers in a sequence or an array.
+pub(crate) fn triple(name: &str, value: &Bound<'_, PyAny>) -> PyResult<[f32; 3]> {
+    let wrong = || -> PyResult<PyErr> {
+        let message = format!("{name}: wanted three finite numbers, got {}", value.repr()?);
+        Ok(PyValueError::new_err(message))
+    };
+    match value.extract::<[f32; 3]>() {
+        Ok(triple) if triple.iter().all(|x| x.is_finite()) => Ok(triple),
+        _ => Err(wrong()?),
+    }
+}
+
+fn any_floats(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f32>> {
     let array = array(name, value)?;
     if array.shape().len() != 1 {
         let came = tuple(array.shape());
@@ -176,13 +213,7 @@ pub(crate) fn floats(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f32>>
     } else {
         return Err(wrong_dtype(name, "float32 or float64", &array));
     };
-    match floats.iter().position(|x| !x.is_finite()) {
-        None => Ok(floats),
-        Some(bad) => Err(PyValueError::new_err(format!(
-            "{name}: wanted finite numbers that fit float32, got {} at index {bad}",
-            floats[bad]
-        ))),
-    }
+    Ok(floats)
 }
 
 /// Whole numbers of any integer type: shape (n,), or `n` of them if that is known.
@@ -203,6 +234,16 @@ pub(crate) fn integers(
     }
     if !matches!(array.dtype().kind(), b'i' | b'u') {
         return Err(wrong_dtype(name, "an integer type", &array));
+    }
+    if is::<u64>(&array) {
+        let unsigned = array.extract::<PyReadonlyArray1<'_, u64>>()?;
+        let narrow = |(i, &n): (usize, &u64)| {
+            i64::try_from(n).map_err(|_| {
+                let message = format!("{name}: wanted numbers below 2**63, got {n} at index {i}");
+                PyValueError::new_err(message)
+            })
+        };
+        return unsigned.as_array().iter().enumerate().map(narrow).collect();
     }
     let wide = array.call_method1("astype", ("int64",))?;
     let wide = wide.extract::<PyReadonlyArray1<'_, i64>>()?;
@@ -301,7 +342,14 @@ pub(crate) fn matrices(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<[[f
         let came = tuple(array.shape());
         return Err(PyValueError::new_err(format!("{name}: wanted shape (n, 4, 4), got {came}")));
     };
-    let flat = floats(name, &array.call_method1("reshape", (16 * n,))?)?;
+    let flat = any_floats(name, &array.call_method1("reshape", (16 * n,))?)?;
+    if let Some(bad) = flat.iter().position(|x| !x.is_finite()) {
+        return Err(PyValueError::new_err(format!(
+            "{name}: wanted finite numbers that fit float32, got {} in the matrix of object {}",
+            flat[bad],
+            bad / 16
+        )));
+    }
     let rows = flat.as_chunks::<4>().0;
     Ok(rows.as_chunks::<4>().0.to_vec())
 }

@@ -23,6 +23,7 @@ use crate::size::pair;
 pub(crate) struct Batch {
     shared: Arc<Shared>,
     asked: frameless::Batch,
+    session_seed: u64,
     camera: Option<Camera>,
     transforms: Transforms,
     answered: Mutex<Answered>,
@@ -39,11 +40,12 @@ impl Batch {
     pub(crate) fn new(
         shared: Arc<Shared>,
         asked: frameless::Batch,
+        session_seed: u64,
         camera: Option<Camera>,
         transforms: Transforms,
     ) -> Batch {
         let answered = Mutex::new(Answered { left: asked.requests.len(), mask: Vec::new() });
-        Batch { shared, asked, camera, transforms, answered }
+        Batch { shared, asked, session_seed, camera, transforms, answered }
     }
 
     fn position_px(&self, i: usize) -> [f32; 2] {
@@ -70,6 +72,7 @@ impl Batch {
                  set session.camera",
             ));
         }
+        Shared::must_not_hold()?;
         let is_last = self.mark(n, &number)?;
         let requests = match &which {
             None => self.asked.requests.clone(),
@@ -104,6 +107,13 @@ impl Batch {
         }
         for i in 0..n {
             if std::mem::replace(&mut answered.mask[number(i)], true) {
+                if (0..i).any(|before| number(before) == number(i)) {
+                    (0..i).for_each(|before| answered.mask[number(before)] = false);
+                    return Err(PyValueError::new_err(format!(
+                        "where: wanted each sample once, got sample {} twice",
+                        number(i)
+                    )));
+                }
                 (0..i).for_each(|before| answered.mask[number(before)] = false);
                 return Err(PyValueError::new_err(format!(
                     "sample {} of batch {} has been answered already; say `where` for parts of a batch",
@@ -118,6 +128,10 @@ impl Batch {
 
     pub(crate) fn asked(&self) -> &frameless::Batch {
         &self.asked
+    }
+
+    pub(crate) fn session_seed(&self) -> u64 {
+        self.session_seed
     }
 
     pub(crate) fn camera_of_size(&self) -> Option<Camera> {
@@ -157,12 +171,13 @@ impl Batch {
         columns::sample_index(py, &self.asked)
     }
 
-    /// A random number for each sample, the same whenever the same sample is asked for again: uint32, shape (n,).
+    /// A random number for each sample, the same whenever the same sample is asked for again: uint32, shape (n,). Another seed of the
+    /// session makes others.
     ///
     /// A renderer with noise makes its random numbers from it alone; that is how noise is told from change.
     #[getter]
     fn seed<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
-        columns::seed(py, &self.asked)
+        columns::seed(py, &self.asked, self.session_seed)
     }
 
     /// The moment of the scene to be traced, in seconds of the scene's own time.

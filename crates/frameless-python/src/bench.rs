@@ -3,7 +3,7 @@
 use frameless::{Answer, Clock, Engine, Time};
 use pyo3::prelude::*;
 
-use crate::names::{reconstruction_kind, sampler_kind};
+use crate::arguments::{reconstruction_kind, sampler_kind};
 use crate::outside::Outside;
 use crate::shared::{Length, State};
 use crate::size::PictureSize;

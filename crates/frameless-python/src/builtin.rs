@@ -8,11 +8,11 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
+use crate::arguments::{sampler_kind, whole};
 use crate::array;
 use crate::canvas::{PyCanvas, checked};
 use crate::handed_on;
 use crate::mirror::CanvasView;
-use crate::names::{sampler_kind, whole};
 use crate::observed::Observed;
 use crate::planes;
 
@@ -65,9 +65,8 @@ const MOST_TURNS: usize = 64;
 const MOST_PIXELS: u32 = 1 << 24;
 
 impl BuiltinSampler {
-    /// The same, with nothing learned yet.
-    pub(crate) fn another(&self) -> Box<dyn Sampler> {
-        self.kind.build(self.seed)
+    pub(crate) fn kind_and_seed(&self) -> (SamplerKind, u64) {
+        (self.kind, self.seed)
     }
 
     /// Works on the sampler and a canvas of Python's, without the interpreter.
@@ -80,7 +79,7 @@ impl BuiltinSampler {
         let work = |canvas: &Canvas| {
             let mut learned = self.sampler.lock().unwrap_or_else(PoisonError::into_inner);
             if learned.size.replace(canvas.size()).is_some_and(|size| size != canvas.size()) {
-                learned.sampler = self.another();
+                learned.sampler = self.kind.build(self.seed);
                 learned.spare.clear();
             }
             work(&mut learned, canvas)

@@ -5,8 +5,9 @@
 #![allow(unsafe_code)]
 
 use std::ffi::c_long;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
+use std::thread::ThreadId;
 
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
@@ -19,6 +20,8 @@ pub(crate) struct Calls(Arc<Known>);
 struct Known {
     /// The interpreter's number of the thread that is in a call; 0: none is.
     thread: AtomicU64,
+    /// The thread that calls, once it has.
+    caller: OnceLock<ThreadId>,
     /// How many wait for what the renderer raises.
     waiting: AtomicUsize,
 }
@@ -47,7 +50,13 @@ impl Calls {
         // Not of `threading`, which takes the thread that imports it first for the main one.
         let thread = py.import("_thread")?.call_method0("get_ident")?.extract()?;
         self.0.thread.store(thread, Ordering::SeqCst);
+        self.0.caller.get_or_init(|| std::thread::current().id());
         Ok(Calling(&self.0))
+    }
+
+    /// Whether this thread is the one that calls.
+    pub(crate) fn is_caller(&self) -> bool {
+        self.0.caller.get() == Some(&std::thread::current().id())
     }
 
     /// Somebody will be told what the renderer raises.

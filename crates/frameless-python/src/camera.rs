@@ -78,14 +78,14 @@ impl Camera {
 impl Camera {
     #[new]
     #[pyo3(signature = (eye, target, up=None, fov=45.0))]
-    fn new(eye: Triple, target: Triple, up: Option<Triple>, fov: f32) -> PyResult<Camera> {
-        let up = up.unwrap_or([0.0, 1.0, 0.0]);
-        for (name, point) in [("eye", eye), ("target", target), ("up", up)] {
-            if !point.iter().all(|x| x.is_finite()) {
-                let message = format!("{name}: wanted three finite numbers, got {point:?}");
-                return Err(PyValueError::new_err(message));
-            }
-        }
+    fn new(
+        eye: &Bound<'_, PyAny>,
+        target: &Bound<'_, PyAny>,
+        up: Option<Bound<'_, PyAny>>,
+        fov: f32,
+    ) -> PyResult<Camera> {
+        let (eye, target) = (array::triple("eye", eye)?, array::triple("target", target)?);
+        let up = up.map(|up| array::triple("up", &up)).transpose()?.unwrap_or([0.0, 1.0, 0.0]);
         if !(fov > 0.0 && fov < 180.0) {
             let message = format!("fov: wanted degrees above 0 and below 180, got {fov}");
             return Err(PyValueError::new_err(message));
@@ -172,14 +172,10 @@ impl Camera {
                 "size: wanted (width, height), since this camera belongs to no picture",
             )
         })?;
-        let (x, y) = (array::floats("x", x)?, array::floats("y", y)?);
-        if x.len() != y.len() {
-            let message = format!("y: wanted shape ({},) like x, got ({},)", x.len(), y.len());
-            return Err(PyValueError::new_err(message));
-        }
+        let places = array::places(x, y)?;
         let optics = self.optics(size);
         let (origins, directions) = py.detach(|| {
-            let rays = x.iter().zip(&y).map(|(&x, &y)| optics.ray_at([x, y]));
+            let rays = places.iter().map(|&place| optics.ray_at(place));
             let rays = rays.map(|ray| (ray.origin.to_array(), ray.direction.to_array()));
             rays.unzip::<_, _, Vec<_>, Vec<_>>()
         });
@@ -212,8 +208,10 @@ impl Camera {
     }
 
     fn __repr__(&self) -> String {
-        let (eye, target, fov) = (self.eye(), self.target(), self.fov());
-        format!("Camera(eye={eye:?}, target={target:?}, fov={fov})")
+        let (eye, target, up, fov) = (self.eye(), self.target(), self.up(), self.fov());
+        let up = if up == (0.0, 1.0, 0.0) { String::new() } else { format!(", up={up:?}") };
+        let size = self.size().map_or(String::new(), |size| format!(".with_size({size:?})"));
+        format!("Camera(eye={eye:?}, target={target:?}{up}, fov={fov}){size}")
     }
 
     fn __eq__(&self, other: &Camera) -> bool {

@@ -7,15 +7,16 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::arguments::reconstruction_kind;
 use crate::array;
 use crate::camera::Camera;
 use crate::hits::Arrays;
-use crate::names::reconstruction_kind;
 use crate::observed::Observed;
 use crate::outside::Outside;
 use crate::planes;
+use crate::raised::Raised;
 use crate::sampler::Nobody;
-use crate::shared::{Length, Raised, Shared, State};
+use crate::shared::{Length, Shared, State};
 use crate::size::{PictureSize, pair};
 
 /// The newest sample of every pixel, and a reconstruction that makes pictures of them: a session without clock and sampler.

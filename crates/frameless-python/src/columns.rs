@@ -34,9 +34,17 @@ pub(crate) fn sample_index<'py>(py: Python<'py>, batch: &Batch) -> Bound<'py, Py
     column(py, batch, |request| request.sample_index)
 }
 
-/// Random numbers that are the same for the same request.
-pub(crate) fn seed<'py>(py: Python<'py>, batch: &Batch) -> Bound<'py, PyArray1<u32>> {
-    column(py, batch, |request| pcg(request.sample_index.wrapping_add(pcg(request.pixel))))
+/// Random numbers that are the same for the same request and seed.
+pub(crate) fn seed<'py>(
+    py: Python<'py>,
+    batch: &Batch,
+    session_seed: u64,
+) -> Bound<'py, PyArray1<u32>> {
+    let [low, high] = [session_seed as u32, (session_seed >> 32) as u32];
+    let key = pcg(low.wrapping_add(pcg(high)));
+    column(py, batch, |request| {
+        pcg(request.sample_index.wrapping_add(pcg(request.pixel.wrapping_add(key))))
+    })
 }
 
 /// A permutation of 32-bit numbers that looks random: PCG-RXS-M-XS (O'Neill 2014), as Jarzynski and Olano 2020 recommend it.

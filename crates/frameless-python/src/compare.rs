@@ -13,8 +13,8 @@ use rayon::prelude::*;
 
 use crate::array;
 use crate::interrupt::{Stop, interruptible};
-use crate::sampler::from_python;
-use crate::shared::Raised;
+use crate::raised::Raised;
+use crate::sampler::Given;
 
 /// A sampler from Python among the algorithms: its name, how its samples are shown, and what makes one of a seed.
 type Custom<'py> = (String, String, Bound<'py, PyAny>);
@@ -117,7 +117,7 @@ fn customs(
         PyValueError::new_err(format!("algorithm {name:?}: there is no reconstruction {shown:?}"))
     })?;
     let plan = |&seed: &u64| {
-        let (sampler, _) = from_python(&factory.call1((seed,))?, seed, raised)?;
+        let (sampler, _) = Given::of(&factory.call1((seed,))?, raised)?.build(seed);
         let cell = cell(scene, algorithm.clone(), rate, seed);
         Ok(Planned { name: name.to_owned(), cell, sampler: Some(sampler) })
     };

@@ -21,18 +21,18 @@ impl<'py> Returned<'py> {
     }
 }
 
-/// Calls `render(x, y, time, camera)`; one with noise with a seed per sample as well.
+/// Calls `render(x, y, time, camera)`; one with noise, which has a `seed`, with one per sample as well.
 pub(crate) fn call<'py>(
     render: &Bound<'py, PyAny>,
     asked: &frameless::Batch,
     camera: Option<Camera>,
-    is_noisy: bool,
+    seed: Option<u64>,
 ) -> PyResult<Returned<'py>> {
     let py = render.py();
     let (x, y, time) = (columns::x(py, asked), columns::y(py, asked), asked.scene_secs);
-    let rgb = match is_noisy {
-        false => render.call1((x, y, time, camera))?,
-        true => render.call1((x, y, time, camera, columns::seed(py, asked)))?,
+    let rgb = match seed {
+        None => render.call1((x, y, time, camera))?,
+        Some(seed) => render.call1((x, y, time, camera, columns::seed(py, asked, seed)))?,
     };
     if !rgb.hasattr("object_id")? {
         return Ok(Returned { rgb, surfaces: [None, None, None] });
@@ -44,6 +44,7 @@ pub(crate) fn call<'py>(
 
 /// Calls it for a batch of a session, and keeps what it returns.
 pub(crate) fn answer(render: &Bound<'_, PyAny>, batch: &Batch, is_noisy: bool) -> PyResult<usize> {
-    let returned = call(render, batch.asked(), batch.camera_of_size(), is_noisy)?;
+    let seed = is_noisy.then_some(batch.session_seed());
+    let returned = call(render, batch.asked(), batch.camera_of_size(), seed)?;
     batch.take(render.py(), &returned.arrays(), None)
 }

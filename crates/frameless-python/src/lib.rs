@@ -3,6 +3,7 @@
 //! Nothing here holds the interpreter while the engine works, and nothing is handed to Python that Rust still writes: arrays that
 //! go out own their memory, arrays that come in are copied once, while they are checked.
 
+mod arguments;
 mod array;
 mod batch;
 mod batches;
@@ -19,11 +20,11 @@ mod interrupt;
 mod invoke;
 mod metrics;
 mod mirror;
-mod names;
 mod observed;
 mod outside;
 mod own;
 mod planes;
+mod raised;
 mod sampler;
 mod scene;
 mod serve;

@@ -2,36 +2,48 @@
 
 use std::cell::RefCell;
 
-use frameless::{Canvas, Insight, Observation, Request, Sampler, Time};
+use frameless::{Canvas, Insight, Observation, Request, Sampler, SamplerKind, Time};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyType;
 
+use crate::arguments::sampler_kind;
 use crate::array;
 use crate::builtin::BuiltinSampler;
 use crate::handed_on::{self, Asked};
 use crate::mirror::{CanvasView, Mirror};
-use crate::names::sampler_kind;
 use crate::observed::Observed;
 use crate::own::Own;
-use crate::shared::Raised;
+use crate::raised::{Raised, Source};
 
-/// A sampler for the engine, and the object behind it if it is Python's.
-pub(crate) type Brought = (Box<dyn Sampler>, Option<Own>);
+/// What was given as a sampler.
+pub(crate) enum Given {
+    /// One of ours: by name, or with a seed of its own.
+    Builtin(SamplerKind, Option<u64>),
+    /// Any object with a method `choose`, and the reference to it.
+    Python(PythonSampler, Own),
+}
 
-/// What was given as a sampler: a name, one of ours, or any object with a method `choose`.
-pub(crate) fn from_python(
-    given: &Bound<'_, PyAny>,
-    seed: u64,
-    raised: &Raised,
-) -> PyResult<Brought> {
-    if let Ok(name) = given.extract::<String>() {
-        return Ok((sampler_kind(&name)?.build(seed), None));
+impl Given {
+    pub(crate) fn of(given: &Bound<'_, PyAny>, raised: &Raised) -> PyResult<Given> {
+        if let Ok(name) = given.extract::<String>() {
+            return Ok(Given::Builtin(sampler_kind(&name)?, None));
+        }
+        if let Ok(builtin) = given.cast::<BuiltinSampler>() {
+            let (kind, seed) = builtin.get().kind_and_seed();
+            return Ok(Given::Builtin(kind, Some(seed)));
+        }
+        let own = Own::new(given.clone().unbind());
+        Ok(Given::Python(PythonSampler::new(given, own.clone(), raised.clone())?, own))
     }
-    if let Ok(builtin) = given.cast::<BuiltinSampler>() {
-        return Ok((builtin.get().another(), None));
+
+    /// A sampler for the engine, and the object behind it if it is Python's.
+    pub(crate) fn build(self, seed: u64) -> (Box<dyn Sampler>, Option<Own>) {
+        match self {
+            Given::Builtin(kind, own_seed) => (kind.build(own_seed.unwrap_or(seed)), None),
+            Given::Python(sampler, own) => (Box::new(sampler), Some(own)),
+        }
     }
-    let own = Own::new(given.clone().unbind());
-    Ok((Box::new(PythonSampler::new(given, own.clone(), raised.clone())?), Some(own)))
 }
 
 /// What it raises is kept for whoever called the engine; it is not asked again until then.
@@ -51,7 +63,8 @@ impl PythonSampler {
         own: Own,
         raised: Raised,
     ) -> PyResult<PythonSampler> {
-        if !sampler.getattr("choose").is_ok_and(|choose| choose.is_callable()) {
+        let can_choose = sampler.getattr("choose").is_ok_and(|choose| choose.is_callable());
+        if !can_choose || sampler.is_instance_of::<PyType>() {
             let came = sampler.repr()?;
             return Err(PyTypeError::new_err(format!(
                 "sampler: wanted a name or an object with a method choose(now, canvas, count), got {came}"
@@ -137,7 +150,7 @@ impl Sampler for PythonSampler {
                 self.refines = asked.refines;
                 requests.extend(pixels.iter().map(|&pixel| asked.request(pixel as u32)));
             }
-            Err(error) => self.raised.set(error),
+            Err(error) => self.raised.set(Source::Sampler, error),
         }
     }
 
@@ -146,7 +159,7 @@ impl Sampler for PythonSampler {
             return;
         }
         let told = Python::attach(|py| self.told(py, canvas, observations));
-        told.unwrap_or_else(|error| self.raised.set(error));
+        told.unwrap_or_else(|error| self.raised.set(Source::Sampler, error));
     }
 
     /// As those do that it hands its calls on to.
@@ -160,7 +173,7 @@ impl Sampler for PythonSampler {
         }
         let probability = Python::attach(|py| self.probability(py, now, canvas));
         let probability = probability.unwrap_or_else(|error| {
-            self.raised.set(error);
+            self.raised.set(Source::Sampler, error);
             Vec::new()
         });
         Insight { probability, ..Insight::default() }

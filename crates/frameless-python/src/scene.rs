@@ -12,10 +12,10 @@ use numpy::prelude::*;
 use pyo3::exceptions::{PyOSError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
+use crate::arguments::whole;
 use crate::array;
 use crate::camera::Camera;
 use crate::interrupt::interruptible;
-use crate::names::whole;
 use crate::size::PictureSize;
 
 /// A scene that changes with time, and the renderer for it: direct light, hard shadows, mirrors, on all cores.
@@ -257,19 +257,16 @@ impl Scene {
         x: &Bound<'py, PyAny>,
         y: &Bound<'py, PyAny>,
         time: f64,
-        camera: Camera,
+        camera: Option<Camera>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (py, secs) = (x.py(), Scene::checked_secs(time)?);
-        let (x, y) = (array::floats("x", x)?, array::floats("y", y)?);
-        if x.len() != y.len() {
-            let message = format!("y: wanted shape ({},) like x, got ({},)", x.len(), y.len());
-            return Err(PyValueError::new_err(message));
-        }
-        let Some((width, height)) = camera.size() else {
-            let message = "camera: wanted one that knows its picture's size, as batches' do; use camera.with_size";
+        let places = array::places(x, y)?;
+        let sized = camera.and_then(|camera| Some((camera, camera.size()?)));
+        let Some((camera, (width, height))) = sized else {
+            let message = "camera: wanted one that knows its picture's size, as the batches have of a session with a camera: \
+                           Session(size, camera=scene.camera()), or camera.with_size(size)";
             return Err(PyValueError::new_err(message));
         };
-        let places: Vec<_> = x.into_iter().zip(y).map(|(x, y)| [x, y]).collect();
         let is_long = places.len() >= MANY_PLACES;
         let asked = self.asked(places, secs, camera, Size::new(width, height));
         let traced = match is_long {

@@ -6,21 +6,20 @@ use std::sync::{Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use frameless::{Clock, SamplerKind};
-use frameless_session::{Helm, LOOP_THREAD, OwnSampler, PictureSize as Shown, Session, Settings};
-use frameless_web::{Options, Server, Show, Stopper};
-use pyo3::exceptions::{PyOSError, PyRuntimeError, PyTypeError};
+use frameless::{Clock, Sampler, SamplerKind};
+use frameless_session::{Helm, PictureSize as Shown, Session, Settings};
+use frameless_web::{MOST_PIXELS, Options, Server, Show, Stopper};
+use pyo3::exceptions::{PyOSError, PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::{PyTraverseError, PyVisit};
 
-use crate::builtin::BuiltinSampler;
+use crate::arguments::{positive, reconstruction_kind, stops, whole};
 use crate::calls::Calls;
 use crate::camera::Camera;
 use crate::interrupt::LOOK_EVERY;
-use crate::names::{positive, reconstruction_kind, sampler_kind, stops, whole};
 use crate::own::Own;
-use crate::sampler::PythonSampler;
-use crate::shared::Raised;
+use crate::raised::Raised;
+use crate::sampler::Given;
 use crate::size::PictureSize;
 use crate::stage::PythonStage;
 
@@ -39,6 +38,8 @@ pub(crate) struct Served {
     stopper: Stopper,
     /// Ctrl-C has ended the waiting for its end: nobody waits for long again.
     given_up: AtomicBool,
+    /// Where its threads are.
+    process: u32,
     /// Until it has been waited for.
     thread: Mutex<Option<JoinHandle<anyhow::Result<()>>>>,
 }
@@ -46,41 +47,21 @@ pub(crate) struct Served {
 /// How long a call of the renderer may take to its end after Ctrl-C before it is left behind.
 const PATIENCE: Duration = Duration::from_millis(150);
 
-/// A sampler for a page, and the object behind it if it is Python's.
-enum Chooser {
-    Kind(SamplerKind),
-    Own(OwnSampler, Option<Own>),
-}
-
-impl Chooser {
-    fn of(given: &Bound<'_, PyAny>, raised: &Raised) -> PyResult<Chooser> {
-        if let Ok(name) = given.extract::<String>() {
-            return Ok(Chooser::Kind(sampler_kind(&name)?));
-        }
-        if let Ok(builtin) = given.cast::<BuiltinSampler>() {
-            let builtin = builtin.clone().unbind();
-            return Ok(Chooser::Own(Box::new(move || builtin.get().another()), None));
-        }
-        let own = Own::new(given.clone().unbind());
-        let sampler = PythonSampler::new(given, own.clone(), raised.clone())?;
-        let make = move || -> Box<dyn frameless::Sampler> { Box::new(sampler.another()) };
-        Ok(Chooser::Own(Box::new(make), Some(own)))
-    }
-}
-
 impl Served {
     fn thread(&self) -> std::sync::MutexGuard<'_, Option<JoinHandle<anyhow::Result<()>>>> {
         self.thread.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn is_running(&self) -> bool {
-        self.thread().as_ref().is_some_and(|thread| !thread.is_finished())
+        let is_here = self.process == std::process::id();
+        is_here && self.thread().as_ref().is_some_and(|thread| !thread.is_finished())
     }
 
     /// Waits for the server's end, without the interpreter. Ctrl-C ends the call of the renderer that is under way, or the waiting if it does not
     /// end. In the thread that calls the renderer, and so has to end first, there is nothing to wait for.
     fn join(&self, py: Python<'_>) -> PyResult<()> {
-        if std::thread::current().name() == Some(LOOP_THREAD) {
+        if self.calls.is_caller() || self.process != std::process::id() {
+            // A process that was forked off has no copy of the threads.
             return Ok(());
         }
         let _waiting = self.calls.wait();
@@ -222,6 +203,12 @@ fn no_function() -> PyErr {
     PyTypeError::new_err("render: wanted a function render(x, y, time, camera)")
 }
 
+/// An error of the server with the names of Python's arguments.
+fn in_python(wrong: &anyhow::Error) -> String {
+    let text = format!("{wrong:#}").replace("--allow-frame ", "allow_frame: ");
+    text.replace("--port 0", "port=0").replace("--port", "port=")
+}
+
 /// See `frameless.serve`.
 #[pyfunction]
 #[pyo3(signature = (
@@ -229,6 +216,7 @@ fn no_function() -> PyErr {
 ))]
 #[expect(clippy::too_many_arguments, reason = "Python's are named")]
 pub(crate) fn start_serving(
+    py: Python<'_>,
     render: &Bound<'_, PyAny>,
     size: PictureSize,
     camera: Camera,
@@ -239,17 +227,24 @@ pub(crate) fn start_serving(
     exposure: f64,
     noisy: bool,
     port: i128,
-    allow_frame: String,
+    allow_frame: Option<String>,
 ) -> PyResult<Served> {
     if !render.is_callable() {
         return Err(no_function());
     }
-    let (raised, calls) = (Raised::default(), Calls::default());
-    let chooser = Chooser::of(sampler, &raised)?;
+    if size.0.pixels() > MOST_PIXELS {
+        return Err(PyValueError::new_err(format!(
+            "size: wanted at most {MOST_PIXELS} pixels on a page, got {}×{}",
+            size.0.width, size.0.height
+        )));
+    }
+    let calls = Calls::default();
+    let raised = Raised::on_page(calls.clone());
+    let given = Given::of(sampler, &raised)?;
     let settings = Settings {
-        sampler: match &chooser {
-            Chooser::Kind(kind) => *kind,
-            Chooser::Own(..) => SamplerKind::default(),
+        sampler: match &given {
+            Given::Builtin(kind, None) => *kind,
+            Given::Builtin(_, Some(_)) | Given::Python(..) => SamplerKind::default(),
         },
         reconstruction: reconstruction_kind(reconstruction)?,
         samples_per_sec: budget.map(|budget| positive("budget", budget)).transpose()?,
@@ -260,14 +255,21 @@ pub(crate) fn start_serving(
     let clock = Clock::real_for_calls(1e-3 * positive("batch_ms", batch_ms)?);
     let port = whole("port", port, 0..=u16::MAX)?;
     let address = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), port);
-    let options = Options { address, allow_frame: Some(allow_frame), ..Options::default() };
-    let server = Server::bind(options).map_err(|e| PyOSError::new_err(format!("{e:#}")))?;
+    let options = Options { address, allow_frame, ..Options::default() };
+    options.check().map_err(|wrong| PyValueError::new_err(in_python(&wrong)))?;
+    let server = Server::bind(options).map_err(|wrong| PyOSError::new_err(in_python(&wrong)))?;
     let render = Own::new(render.clone().unbind());
     let stage = PythonStage::new(render.clone(), camera, noisy, raised.clone(), calls.clone());
-    let session = Session::new(size.0, clock, settings, 1, stage);
-    let (session, sampler) = match chooser {
-        Chooser::Kind(_) => (session, None),
-        Chooser::Own(make, own) => (session.with_own_sampler(make), own),
+    let session = py.detach(|| Session::new(size.0, clock, settings, 1, stage));
+    let (session, sampler) = match given {
+        Given::Builtin(_, None) => (session, None),
+        Given::Builtin(kind, Some(seed)) => {
+            (session.with_own_sampler(Box::new(move || kind.build(seed))), None)
+        }
+        Given::Python(sampler, own) => {
+            let make = move || -> Box<dyn Sampler> { Box::new(sampler.another()) };
+            (session.with_own_sampler(Box::new(make)), Some(own))
+        }
     };
     let helm = Helm::without_scene(camera.view(), camera.target_point());
     let show = Show { session, helm, scenes: None };
@@ -284,6 +286,7 @@ pub(crate) fn start_serving(
         calls,
         stopper,
         given_up: AtomicBool::new(false),
+        process: std::process::id(),
         thread: Mutex::new(Some(thread)),
     })
 }

@@ -11,17 +11,18 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use pyo3::{PyTraverseError, PyVisit};
 
+use crate::arguments::{finite, positive, reconstruction_kind, stops, whole};
 use crate::array;
 use crate::batch::Batch;
 use crate::batches::Batches;
 use crate::camera::Camera;
 use crate::invoke;
-use crate::names::{finite, positive, reconstruction_kind, stops, whole};
 use crate::outside::{Outside, Placed};
 use crate::own::Own;
 use crate::planes;
-use crate::sampler::from_python;
-use crate::shared::{Length, Raised, Shared, State};
+use crate::raised::Raised;
+use crate::sampler::Given;
+use crate::shared::{Length, Shared, State};
 use crate::size::{PictureSize, pair};
 
 /// A picture that is never finished: a canvas, a clock, and a sampler that says which pixels are worth tracing now.
@@ -77,9 +78,12 @@ impl Session {
     /// The next batch that has samples, or `None` at the end. Looks for Ctrl-C while it waits.
     pub(crate) fn next_batch(&self, py: Python<'_>, end: Option<Time>) -> PyResult<Option<Batch>> {
         loop {
+            if self.shared.is_closed() {
+                return Ok(None);
+            }
             let chosen = self.shared.with_long(py, move |state| {
                 let is_over = end.is_some_and(|end| state.engine.now() >= end);
-                if state.is_closed || is_over {
+                if is_over {
                     return None;
                 }
                 state.refresh_if_due();
@@ -90,7 +94,8 @@ impl Session {
             })?;
             let Some((asked, camera, transforms)) = chosen else { return Ok(None) };
             if !asked.requests.is_empty() {
-                return Ok(Some(Batch::new(Arc::clone(&self.shared), asked, camera, transforms)));
+                let shared = Arc::clone(&self.shared);
+                return Ok(Some(Batch::new(shared, asked, self.seed, camera, transforms)));
             }
             py.check_signals()?;
             if !self.simulated {
@@ -121,6 +126,7 @@ impl Session {
     ))]
     #[expect(clippy::too_many_arguments, reason = "Python's are named")]
     fn new(
+        py: Python<'_>,
         size: PictureSize,
         sampler: Option<Bound<'_, PyAny>>,
         reconstruction: &str,
@@ -138,7 +144,7 @@ impl Session {
         let raised = Raised::default();
         let (sampler, own_sampler) = match sampler {
             None => (SamplerKind::default().build(seed), None),
-            Some(sampler) => from_python(&sampler, seed, &raised)?,
+            Some(sampler) => Given::of(&sampler, &raised)?.build(seed),
         };
         let clock = match simulated {
             None => Clock::real(),
@@ -154,12 +160,16 @@ impl Session {
             }
             Some(rate) => Clock::simulated(positive("simulated", rate)?),
         };
-        let mut engine = Engine::new(size.0, clock, sampler, Outside::new(camera, noisy));
-        engine.set_reconstruction(reconstruction.build());
-        engine.set_display(Display::new(stops(exposure)?));
+        let stops = stops(exposure)?;
         let budget = budget.map(|budget| positive("budget", budget)).transpose()?;
-        engine.set_budget(budget);
-        let mut state = State::new(engine, length(batch, batch_ms)?);
+        let length = length(batch, batch_ms)?;
+        let mut state = py.detach(move || {
+            let mut engine = Engine::new(size.0, clock, sampler, Outside::new(camera, noisy));
+            engine.set_reconstruction(reconstruction.build());
+            engine.set_display(Display::new(stops));
+            engine.set_budget(budget);
+            State::new(engine, length)
+        });
         state.budget = budget;
         let shared = Arc::new(Shared::new(state, raised.clone()));
         let own_sampler = Mutex::new(own_sampler);
@@ -292,7 +302,7 @@ impl Session {
 
     /// Let another sampler choose from now on, by name or as an object; the picture stays.
     fn set_sampler(&self, py: Python<'_>, sampler: &Bound<'_, PyAny>) -> PyResult<()> {
-        let (sampler, own) = from_python(sampler, self.seed, &self.raised)?;
+        let (sampler, own) = Given::of(sampler, &self.raised)?.build(self.seed);
         // The one before goes without any lock held: what it does then may ask for this session.
         let before = self.shared.with(py, |state| state.engine.replace_sampler(sampler))?;
         let own_before = std::mem::replace(&mut *self.own_sampler(), own);
@@ -318,12 +328,13 @@ impl Session {
         planes::image(py, &self.shared, None, out)
     }
 
-    /// Newest sample of each pixel: linear RGB radiance, float32, shape (height, width, 3).
+    /// Newest sample of each pixel's centre: linear RGB radiance, float32, shape (height, width, 3). What is added to it while the picture
+    /// rests is in `image` only.
     fn rgb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         planes::rgb(py, &self.shared)
     }
 
-    /// Seconds since what each pixel shows was traced, infinite where nothing is known: float32, shape (height, width).
+    /// Seconds since each pixel was last found to show what it shows, infinite where nothing is known: float32, shape (height, width).
     fn age<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         planes::age(py, &self.shared, None)
     }
@@ -396,13 +407,13 @@ impl Session {
 
     /// Whether `close` has been called.
     #[getter]
-    fn closed(&self, py: Python<'_>) -> PyResult<bool> {
-        self.shared.with(py, |state| state.is_closed)
+    fn closed(&self) -> bool {
+        self.shared.is_closed()
     }
 
     /// No more batches: loops over the session end. Pictures can still be asked for, and late answers given.
-    fn close(&self, py: Python<'_>) -> PyResult<()> {
-        self.shared.with(py, |state| state.is_closed = true)
+    fn close(&self) {
+        self.shared.close();
     }
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
@@ -426,11 +437,7 @@ impl Session {
     }
 
     #[pyo3(signature = (*_exception))]
-    fn __exit__(
-        &self,
-        py: Python<'_>,
-        _exception: &Bound<'_, pyo3::types::PyTuple>,
-    ) -> PyResult<()> {
-        self.close(py)
+    fn __exit__(&self, _exception: &Bound<'_, pyo3::types::PyTuple>) {
+        self.close();
     }
 }

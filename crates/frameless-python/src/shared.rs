@@ -1,7 +1,9 @@
 //! An engine that Python's threads share: one at a time, and never while holding the interpreter.
 
 use std::cell::Cell;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use frameless::{BatchLength, Engine, Observation, Time};
 use pyo3::exceptions::PyRuntimeError;
@@ -9,35 +11,7 @@ use pyo3::prelude::*;
 
 use crate::interrupt::interruptible;
 use crate::outside::Outside;
-
-/// What a sampler written in Python has raised, until somebody can be told.
-#[derive(Clone, Default)]
-pub(crate) struct Raised(Arc<Mutex<Option<PyErr>>>);
-
-impl Raised {
-    /// Keeps the first of several.
-    pub(crate) fn set(&self, error: PyErr) {
-        self.slot().get_or_insert(error);
-    }
-
-    pub(crate) fn is_set(&self) -> bool {
-        self.slot().is_some()
-    }
-
-    /// What it is, in a line; `None` if nothing has been raised.
-    pub(crate) fn describe(&self, py: Python<'_>) -> Option<String> {
-        let error = self.slot().as_ref().map(|error| error.clone_ref(py))?;
-        Some(error.to_string())
-    }
-
-    pub(crate) fn take(&self) -> PyResult<()> {
-        self.slot().take().map_or(Ok(()), Err)
-    }
-
-    fn slot(&self) -> std::sync::MutexGuard<'_, Option<PyErr>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
+use crate::raised::Raised;
 
 /// How many samples are asked for at once.
 pub(crate) enum Length {
@@ -59,7 +33,6 @@ pub(crate) struct State {
     pub(crate) engine: Engine<Outside>,
     pub(crate) length: Length,
     pub(crate) budget: Option<f64>,
-    pub(crate) is_closed: bool,
     /// Change d of every pixel when it was traced last; NaN if never.
     pub(crate) changes: Vec<f32>,
     /// Which canvas `changes` are of.
@@ -91,7 +64,7 @@ impl State {
         let changes = vec![f32::NAN; engine.canvas().size().pixels()];
         let generation = engine.canvas().generation();
         let refreshes = Refreshes::default();
-        State { engine, length, budget: None, is_closed: false, changes, generation, refreshes }
+        State { engine, length, budget: None, changes, generation, refreshes }
     }
 
     /// The picture at `now`.
@@ -143,10 +116,16 @@ impl State {
 /// Pixels from which on a picture may take longer than one would wait for Ctrl-C.
 const LARGE_PICTURE: usize = 1 << 21;
 
+/// How often somebody who waits for long work looks for Ctrl-C.
+const POLL: Duration = Duration::from_millis(2);
+
 /// A [`State`] behind a lock.
 pub(crate) struct Shared {
     state: Mutex<State>,
     raised: Raised,
+    is_closed: AtomicBool,
+    /// How many threads do what may take seconds.
+    long_work: AtomicUsize,
 }
 
 thread_local! {
@@ -164,7 +143,8 @@ impl Drop for Holding {
 
 impl Shared {
     pub(crate) fn new(state: State, raised: Raised) -> Shared {
-        Shared { state: Mutex::new(state), raised }
+        let (is_closed, long_work) = (AtomicBool::new(false), AtomicUsize::new(0));
+        Shared { state: Mutex::new(state), raised, is_closed, long_work }
     }
 
     /// Lets go of the interpreter, waits for the state, and works on it.
@@ -177,9 +157,9 @@ impl Shared {
         work: impl FnOnce(&mut State) -> R + Send,
     ) -> PyResult<R> {
         Shared::must_not_hold()?;
-        let outcome = py.detach(|| self.locked(work));
-        self.raised.take()?;
-        Ok(outcome)
+        self.wait_for_long_work(py)?;
+        let (outcome, raised) = py.detach(|| self.locked(work));
+        raised.map(|()| outcome)
     }
 
     /// As [`Shared::with`], for what takes long on large pictures: Ctrl-C ends the waiting; the work goes on to its end.
@@ -192,12 +172,37 @@ impl Shared {
             return self.with(py, work);
         }
         let shared = Arc::clone(self);
-        let outcome = interruptible(py, move |_| shared.locked(work))?;
-        self.raised.take()?;
-        Ok(outcome)
+        self.long_work.fetch_add(1, Ordering::SeqCst);
+        let (outcome, raised) = interruptible(py, move |_| {
+            let outcome = shared.locked(work);
+            shared.long_work.fetch_sub(1, Ordering::SeqCst);
+            outcome
+        })?;
+        raised.map(|()| outcome)
     }
 
-    fn must_not_hold() -> PyResult<()> {
+    /// What somebody has left behind by Ctrl-C may hold the state for seconds.
+    fn wait_for_long_work(&self, py: Python<'_>) -> PyResult<()> {
+        while self.long_work.load(Ordering::SeqCst) > 0 {
+            py.detach(|| std::thread::sleep(POLL));
+            py.check_signals()?;
+        }
+        Ok(())
+    }
+
+    /// Whether no more batches are given out.
+    pub(crate) fn is_closed(&self) -> bool {
+        self.is_closed.load(Ordering::SeqCst)
+    }
+
+    /// At once, whoever holds the state.
+    pub(crate) fn close(&self) {
+        self.is_closed.store(true, Ordering::SeqCst);
+    }
+
+    /// # Errors
+    /// In a sampler that this thread is running.
+    pub(crate) fn must_not_hold() -> PyResult<()> {
         match HOLDS.get() {
             true => Err(PyRuntimeError::new_err(
                 "a sampler must not use a session or a canvas other than the one it is given",
@@ -206,11 +211,13 @@ impl Shared {
         }
     }
 
-    fn locked<R>(&self, work: impl FnOnce(&mut State) -> R) -> R {
+    /// Returns what the sampler has raised meanwhile, too: nobody else is to be told of it.
+    fn locked<R>(&self, work: impl FnOnce(&mut State) -> R) -> (R, PyResult<()>) {
         // A panic leaves a canvas with some samples missing, which is nothing special.
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         HOLDS.set(true);
         let _holding = Holding;
-        work(&mut state)
+        let outcome = work(&mut state);
+        (outcome, self.raised.take())
     }
 }

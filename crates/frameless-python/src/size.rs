@@ -15,7 +15,7 @@ impl<'a, 'py> FromPyObject<'a, 'py> for PictureSize {
     type Error = PyErr;
 
     fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<PictureSize> {
-        let Ok((width, height)) = object.extract::<(i64, i64)>() else {
+        let Ok([width, height]) = object.extract::<[i64; 2]>() else {
             let came = object.repr()?;
             return Err(PyTypeError::new_err(format!(
                 "size: wanted (width, height) in pixels, two whole numbers, got {came}"

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use frameless::{Answer, Batch, Pose, Size, Tracer};
 use frameless_session::{Stage, ViewChoice};
-use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
 use crate::calls::Calls;
@@ -13,7 +13,7 @@ use crate::camera::Camera;
 use crate::invoke;
 use crate::outside::Outside;
 use crate::own::Own;
-use crate::shared::Raised;
+use crate::raised::{Raised, Source};
 
 /// Calls the function for every batch, with the interpreter held. What it raises is kept in `raised`; it is not called again until
 /// somebody has taken that.
@@ -27,6 +27,8 @@ pub(crate) struct PythonStage {
     answers: VecDeque<Answer>,
 }
 
+/// Of a page's random numbers.
+const SEED: u64 = 1;
 /// How often a loop whose renderer has failed looks whether somebody has mended it.
 const REST: Duration = Duration::from_millis(20);
 
@@ -50,7 +52,7 @@ impl PythonStage {
         let shown = Some(camera.of_size(batch.size));
         let returned = {
             let _calling = self.calls.begin(py)?;
-            invoke::call(&render, batch, shown, self.outside.is_noisy)?
+            invoke::call(&render, batch, shown, self.outside.is_noisy.then_some(SEED))?
         };
         let at = |i: usize| {
             let [x, y] = batch.requests[i].position_px(batch.size);
@@ -64,23 +66,6 @@ impl PythonStage {
     }
 }
 
-impl PythonStage {
-    fn fail(&mut self, error: PyErr) {
-        Python::attach(|py| {
-            let is_interrupt = error.is_instance_of::<PyKeyboardInterrupt>(py);
-            if !is_interrupt && !self.calls.has_waiting() {
-                error.display(py);
-                let advice = "frameless: the picture stands still until page.check(), page.set_render(...) or page.stop()\n";
-                // Where there is no stderr nobody reads it.
-                py.import("sys")
-                    .and_then(|sys| sys.getattr("stderr")?.call_method1("write", (advice,)))
-                    .ok();
-            }
-        });
-        self.raised.set(error);
-    }
-}
-
 impl Tracer for PythonStage {
     fn submit(&mut self, batch: Batch) {
         if self.raised.is_set() {
@@ -90,8 +75,11 @@ impl Tracer for PythonStage {
         // No interpreter: the program is ending.
         match Python::try_attach(|py| self.answer(py, &batch)) {
             Some(Ok(answer)) => self.answers.push_back(answer),
-            Some(Err(error)) => self.fail(error),
-            None => self.raised.set(PyRuntimeError::new_err("the interpreter is gone")),
+            Some(Err(error)) => self.raised.set(Source::Renderer, error),
+            None => {
+                let gone = PyRuntimeError::new_err("the interpreter is gone");
+                self.raised.set(Source::Renderer, gone);
+            }
         }
     }
 
@@ -122,7 +110,6 @@ impl Stage for PythonStage {
     fn set_world(&mut self, (): ()) {}
 
     fn trouble(&mut self) -> Option<String> {
-        let raised = Python::try_attach(|py| self.raised.describe(py)).flatten()?;
-        Some(format!("the renderer has failed: {raised}"))
+        Python::try_attach(|py| self.raised.describe(py)).flatten()
     }
 }

@@ -68,7 +68,7 @@ impl Options {
     ///
     /// # Errors
     /// With what to say instead.
-    pub(crate) fn check(&self) -> anyhow::Result<()> {
+    pub fn check(&self) -> anyhow::Result<()> {
         let ip = self.address.ip();
         if !ip.is_loopback() && self.tls.is_none() && !self.insecure {
             bail!(

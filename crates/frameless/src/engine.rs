@@ -22,6 +22,8 @@ pub struct Engine<T> {
     // Samples submitted and not yet answered.
     outstanding: usize,
     counters: Counters,
+    // The first batch of the canvas's present size.
+    first_batch: u64,
     // Reused from batch to batch.
     spare_requests: Vec<Request>,
     replaced: Replaced,
@@ -137,6 +139,7 @@ impl<T: Tracer> Engine<T> {
             tracer,
             outstanding: 0,
             counters: Counters::default(),
+            first_batch: 0,
             spare_requests: Vec::new(),
             replaced: Replaced::default(),
             findings: Findings::default(),
@@ -278,6 +281,12 @@ impl<T: Tracer> Engine<T> {
     /// # Errors
     /// As [`Engine::step`].
     pub fn answer(&mut self, answer: Answer) -> Result<usize, EngineError> {
+        if answer.batch < self.first_batch {
+            // Of another canvas, even if that had this one's size.
+            self.counters.dropped += answer.requests.len() as u64;
+            self.observations.clear();
+            return Ok(0);
+        }
         let outcome = self.keep(&answer);
         let kept = self.observe(answer.now);
         self.spare_requests = answer.requests;
@@ -552,6 +561,7 @@ impl<T: Tracer> Engine<T> {
     pub fn resize(&mut self, size: Size) {
         if size != self.canvas.size() {
             self.canvas = self.canvas.resized(size);
+            self.first_batch = self.counters.batches;
             self.observations.clear();
             self.hand_over_canvas();
         }

@@ -377,3 +377,23 @@ fn a_renderer_works_on_while_a_picture_is_made() {
     let after = engine.tracer().longest;
     assert!(after < 2 * longest, "batches of {after} samples, before that {longest}");
 }
+
+#[test]
+fn answers_to_a_canvas_before_the_last_resize_are_dropped_whatever_its_size_was() {
+    let (large, small) = (Size::new(30, 20), Size::new(8, 8));
+    for kind in SamplerKind::ALL {
+        let mut engine = engine(large, 30_000.0, kind, still);
+        let old = engine.choose(usize::MAX);
+        engine.resize(small);
+        let middle = engine.choose(usize::MAX);
+        engine.resize(large);
+        let new = engine.choose(usize::MAX);
+        for (batch, is_kept) in [(old, false), (middle, false), (new, true)] {
+            let rgb = still(&batch);
+            let wanted = if is_kept { batch.requests.len() } else { 0 };
+            let kept = engine.answer(Answer::to(batch, rgb, Vec::new())).expect("finite colours");
+            assert_eq!(kept, wanted, "{}", kind.name());
+        }
+        assert!(engine.counters().dropped > 0);
+    }
+}

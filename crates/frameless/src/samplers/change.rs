@@ -84,9 +84,9 @@ impl Sampler for Change {
         known.pdf.draw(&mut self.rng, count, requests);
     }
 
-    fn observe(&mut self, _canvas: &Canvas, observations: &[Observation]) {
+    fn observe(&mut self, canvas: &Canvas, observations: &[Observation]) {
         // Before the first choice there is nothing to update: the sums will be made from the canvas.
-        let Some(known) = &mut self.known else { return };
+        let Some(known) = self.known.as_mut().filter(|known| known.is_of(canvas)) else { return };
         for observation in observations {
             known.sums.update(observation);
         }

@@ -1,4 +1,4 @@
-//! Arguments that are names, and whole numbers within limits.
+//! Arguments that are names, and numbers within limits.
 
 use std::ops::RangeInclusive;
 
