@@ -91,7 +91,7 @@ fn tests() -> Result<Done> {
     Ok(Done { skipped: skipped_by_pytest(&text), ..Done::passed("") })
 }
 
-/// mypy on the package and its tests (strict) and on the examples, and the compiled half against its stub.
+/// mypy on the package and its tests (strict) and on the examples, and the compiled half against its stub and its docstrings.
 fn types() -> Result<Done> {
     let mut mypy = python();
     mypy.current_dir(in_project("python")).args(["-m", "mypy"]);
@@ -107,6 +107,9 @@ fn types() -> Result<Done> {
     stubtest.current_dir(in_project("python/tests"));
     stubtest.args(["-m", "mypy.stubtest", "frameless", "--concise"]);
     said(&mut stubtest, CHECKS_WITHIN)?;
+    let mut docstrings = python();
+    docstrings.current_dir(in_project("python/tests"));
+    said(docstrings.args(["../docs/stub_docs.py", "--check"]), CHECKS_WITHIN)?;
     Ok(Done::passed(text.trim()))
 }
 
