@@ -2,7 +2,7 @@
 //!
 //! The display's rate where both are cheap. Where painting is not (software rendering on few cores takes 10 ms and
 //! more), a fixed share of one core: what the window takes, the picture loses. Where making the picture of the samples is
-//! not, a fixed share of the render loop's time: no samples come meanwhile, and a slow refresh should lower the rate of
+//! not, a fixed share of the render loop's time: no samples are chosen meanwhile, and a slow refresh should lower the rate of
 //! pictures rather than that of samples. An answer to somebody who has just done something is made at once, on credit: what
 //! rest that costs the samples is owed, and once too much is owed the next picture waits.
 

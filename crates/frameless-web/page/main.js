@@ -40,13 +40,17 @@ let inputs = 0;
 let exact = null;
 
 const drives = () => state !== null && state.driver === client;
+const WATCHING = "you are watching; take the controls to change anything";
+
+/** Whether this page may change anything. Where nobody drives, whoever does something drives. */
+const mayAct = () => state !== null && (state.driver === null || drives());
 
 // ---- to the server ----
 
-/** Whether this page may change anything; if not, it says why. Where nobody drives, whoever does something drives. */
+/** Whether this page may change anything; if not, it says why. */
 function mayAsk() {
-  if (state === null || state.driver === null || drives()) return true;
-  messages.info("you are watching; take the controls to change anything");
+  if (state === null || mayAct()) return true;
+  messages.info(WATCHING);
   return false;
 }
 
@@ -110,8 +114,9 @@ const heard = {
 
   state(message) {
     state = message;
-    panel.show(message, drives());
-    transport.state(message, drives());
+    panel.show(message, mayAct());
+    transport.state(message, mayAct());
+    if (mayAct()) messages.forget(WATCHING);
     showDriver();
     showLoading(message.loading);
   },
@@ -149,7 +154,7 @@ async function findOutWhy(reason) {
   if (answer.status === 403) {
     // The server has another secret: this page cannot come back by itself.
     connection.pause();
-    showBanner("The server has been started anew: open the address that it printed.", false);
+    showBanner("The server has been started anew, with another secret: open the address that it printed. (With --key-file pages come back by themselves.)", false);
     return;
   }
   const { clients, most } = await answer.json().catch(() => ({}));
@@ -169,8 +174,21 @@ picture.onDrawn = (message) => {
   document.dispatchEvent(new CustomEvent("frameless:drawn", { detail }));
 };
 picture.onResized = () => layout.apply();
-picture.onCompared = (same) => showExact(same);
+picture.onCompared = (same) => {
+  showExact(same);
+  if (same === false) startAnew("the picture differs from the server's");
+};
 picture.onBroken = (error) => connection.restart(`tiles could not be decoded: ${error.message}`);
+
+let startedAnew = -Infinity;
+
+/** All of the picture is sent again; not for ever, if that does not help. */
+function startAnew(reason) {
+  if (performance.now() - startedAnew < 60_000) return;
+  startedAnew = performance.now();
+  connection.restart(reason);
+}
+
 latency.onMeasured = (ms) => document.dispatchEvent(new CustomEvent("frameless:latency", { detail: ms }));
 
 // ---- what is shown ----
@@ -252,7 +270,7 @@ recorder.onChange = ({ recording, secs }) => {
   byId("record-time").hidden = !recording;
   byId("record-time").textContent = `${secs.toFixed(0)} s`;
 };
-upload.allowed = drives;
+upload.allowed = mayAct;
 
 const on = (id, name, handler) => byId(id).addEventListener(name, handler);
 on("drive", "click", () => connection.send({ type: "drive", on: !drives() }));
@@ -287,7 +305,9 @@ const KEYS = {
 // Whoever has chosen with the mouse goes on with the picture; whoever came by the tab key stays at the control.
 let byPointer = false;
 addEventListener("pointerdown", () => (byPointer = true), true);
-addEventListener("change", ({ target }) => byPointer && target.matches("select") && toPicture());
+addEventListener("change", ({ target }) => byPointer && target.matches("select, [type=checkbox], [type=radio]") && toPicture());
+// (A click that a key has made has no detail.)
+addEventListener("click", ({ target, detail }) => detail > 0 && target.closest("button") && !byId("keys").open && toPicture());
 
 function toPicture() {
   canvas.focus({ preventScroll: true });

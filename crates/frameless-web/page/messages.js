@@ -7,6 +7,7 @@ const MOST = 4;
 
 export class Messages {
   #place;
+  #timers = new WeakMap();
 
   constructor(place) {
     this.#place = place;
@@ -25,13 +26,22 @@ export class Messages {
     this.#say(text, level in STAYS_MS ? level : "info");
   }
 
+  /** It is no longer so. */
+  forget(text) {
+    this.#line(text)?.remove();
+  }
+
   clear() {
     this.#place.replaceChildren();
   }
 
   #say(text, level) {
-    // What is said again is no second line.
-    for (const old of this.#place.children) if (old.dataset.text === text) old.remove();
+    // What is said again is no second line, and nothing new to be read aloud.
+    const old = this.#line(text);
+    if (old !== undefined) {
+      this.#stay(old, level);
+      return;
+    }
     while (this.#place.children.length >= MOST) this.#place.firstElementChild.remove();
     const line = document.createElement("div");
     line.className = `message ${level}`;
@@ -41,6 +51,15 @@ export class Messages {
     button.addEventListener("click", () => line.remove());
     line.append(Object.assign(document.createElement("span"), { textContent: text }), button);
     this.#place.append(line);
-    setTimeout(() => line.remove(), STAYS_MS[level]);
+    this.#stay(line, level);
+  }
+
+  #line(text) {
+    return [...this.#place.children].find((line) => line.dataset.text === text);
+  }
+
+  #stay(line, level) {
+    clearTimeout(this.#timers.get(line));
+    this.#timers.set(line, setTimeout(() => line.remove(), STAYS_MS[level]));
   }
 }

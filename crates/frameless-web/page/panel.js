@@ -68,9 +68,9 @@ export class Panel {
   }
 
   /** All settings as they are now. */
-  show(state, drives) {
+  show(state, mayAct) {
     this.#state = state;
-    byId("controls").disabled = !drives;
+    byId("controls").disabled = !mayAct;
     byId("camera").value = state.camera === null ? "" : String(state.camera);
     if (performance.now() - this.#touched > HANDS_OFF_MS) this.#apply(state.settings);
     else setTimeout(() => this.#state && this.show(this.#state, !byId("controls").disabled), HANDS_OFF_MS);

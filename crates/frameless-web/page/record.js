@@ -52,12 +52,17 @@ export class Recorder {
 
   #save(parts) {
     const video = new Blob(parts, { type: "video/mp4" });
-    if (video.size === 0) return;
+    if (video.size < SMALLEST_BYTES) {
+      this.onNotice("warning", "nothing was recorded: that was too short");
+      return;
+    }
     const name = download(video, this.scene, "mp4");
     this.onNotice("info", `recorded ${name}, ${(video.size / 1e6).toFixed(1)} MB`);
   }
 }
 
+// A file's heads alone.
+const SMALLEST_BYTES = 2000;
 // At rest a canvas is not drawn to, but a video must go on.
 const PICTURES_PER_SEC = 30;
 // A tenth of a bit per pixel looks clean with H.264; small pictures need more for their edges.

@@ -37,16 +37,17 @@ export class Transport {
     byId("time").hidden = !(this.#duration > 0);
     byId("timeless").hidden = this.#duration > 0;
     byId("scrub").hidden = duration === null;
+    byId("play").hidden = duration === 0;
     byId("scrub").max = duration > 0 ? duration : 1;
     this.#write(this.#told.secs);
   }
 
-  state({ playing, speed }, drives) {
+  state({ playing, speed }, mayAct) {
     [this.#playing, this.#speed] = [playing, speed];
     byId("play").classList.toggle("paused", !playing);
     byId("play").setAttribute("aria-label", playing ? "Pause" : "Play");
     if (document.activeElement !== byId("speed")) byId("speed").value = speed;
-    for (const id of ["play", "scrub", "speed"]) byId(id).disabled = !drives;
+    for (const id of ["play", "scrub", "speed"]) byId(id).disabled = !mayAct;
   }
 
   /** Nobody knows how time goes on. */

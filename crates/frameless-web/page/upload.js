@@ -44,7 +44,7 @@ export class Upload {
 
   #whatIsWrong(file) {
     if (!this.allowed()) return "take the controls first: only who drives can open a scene";
-    if (this.limit.bytes === 0) return "this renderer takes no scenes";
+    if (this.limit.bytes === 0) return "files are not taken here";
     if (this.#request) return "one upload at a time, please";
     if (!/\.glb$/i.test(file.name))
       return `wanted a .glb, got ${file.name}; a .gltf with its files can be made one by any glTF tool`;

@@ -21,6 +21,8 @@ use outgoing::{Outgoing, Ready, Room};
 
 /// How often a client is asked whether it is still there, while it may stall.
 const PINGS: u32 = 3;
+/// That often, in the time after which a stalled client is dropped, it is looked whether one is.
+const CHECKS: u32 = 30;
 /// Status while something changes.
 const STATUS: Duration = Duration::from_millis(250);
 /// Of those, one in so many at rest.
@@ -140,6 +142,7 @@ impl Connection {
         let mut status = interval(STATUS);
         status.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut ping = interval(self.stalled / PINGS);
+        let mut check = interval(self.stalled / CHECKS);
         let mut pictures = self.hub.pictures.clone();
         let mailbox = Arc::clone(&self.mailbox);
         loop {
@@ -163,7 +166,8 @@ impl Connection {
                     None => Err(End::Gone),
                 },
                 _ = status.tick() => self.send_status().await,
-                _ = ping.tick() => self.ping().await,
+                _ = ping.tick() => self.send(Message::Ping(Default::default())).await,
+                _ = check.tick() => self.check_stalled(),
                 () = at(later), if later.is_some() => {
                     self.look = true;
                     Ok(())
@@ -181,7 +185,9 @@ impl Connection {
         if !self.look || room == 0 {
             return;
         }
-        let Some(picture) = self.hub.pictures.borrow().clone() else { return };
+        if self.hub.pictures.borrow().is_none() {
+            return;
+        }
         let Some(outgoing) = self.outgoing.take() else { return };
         (self.look, self.look_at) = (false, None);
         let room = Room {
@@ -192,6 +198,8 @@ impl Connection {
         };
         let hub = self.hub.clone();
         self.making = Some(tokio::task::spawn_blocking(move || {
+            // The newest one only now: it may have waited for others to be encoded.
+            let picture = hub.pictures.borrow().clone().expect("there has been one");
             let begin = Instant::now();
             let ready = outgoing.make(picture, &room);
             hub.painted(begin.elapsed());
@@ -248,13 +256,13 @@ impl Connection {
         }
     }
 
-    async fn ping(&mut self) -> Result<(), End> {
+    fn check_stalled(&self) -> Result<(), End> {
         let now = Instant::now();
         let unanswered = self.flow.waiting_since().map_or(Duration::ZERO, |since| now - since);
-        if unanswered >= self.stalled || now - self.heard_at >= self.stalled {
-            return Err(End::Stalled);
+        match unanswered >= self.stalled || now - self.heard_at >= self.stalled {
+            true => Err(End::Stalled),
+            false => Ok(()),
         }
-        self.send(Message::Ping(Default::default())).await
     }
 
     /// Told four times a second.

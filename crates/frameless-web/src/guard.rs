@@ -17,8 +17,6 @@ use crate::Secret;
 #[derive(Debug)]
 pub(crate) struct Guard {
     pub(crate) secret: Secret,
-    /// The cookie's name. Cookies know no ports: two servers of one machine must not share it.
-    pub(crate) cookie: String,
     /// Host names and addresses without port, in lower case. Whatever the port: a tunnel may end at another.
     pub(crate) names: Vec<String>,
     /// Whether this server speaks TLS.
@@ -86,12 +84,21 @@ impl Guard {
         keys.next().is_some_and(|key| self.secret.is(key))
     }
 
+    /// Cookies know no ports, and servers behind one name must not share one: its name has the port that the browser sees, which is a tunnel's
+    /// if there is one.
+    pub(crate) fn cookie(&self, headers: &HeaderMap) -> String {
+        let host = only(headers, HOST).ok().flatten().unwrap_or_default();
+        let port = host.rsplit_once(':').and_then(|(_, port)| port.parse::<u16>().ok());
+        format!("frameless-{}", port.unwrap_or(if self.tls { 443 } else { 80 }))
+    }
+
     fn has_cookie(&self, headers: &HeaderMap) -> bool {
+        let cookie = self.cookie(headers);
         let values = headers.get_all(COOKIE).into_iter().filter_map(|value| value.to_str().ok());
         let pairs = values.flat_map(|value| value.split(';'));
         let ours = pairs
             .filter_map(|pair| pair.trim().split_once('='))
-            .filter(|(name, _)| *name == self.cookie);
+            .filter(|(name, _)| *name == cookie);
         // Every one is compared, so that the time taken does not tell which was right.
         ours.fold(false, |found, (_, value)| found | self.secret.is(value))
     }
@@ -172,7 +179,6 @@ mod tests {
     fn guard() -> Guard {
         Guard {
             secret: Secret::new().unwrap(),
-            cookie: "frameless-8420".to_owned(),
             names: ["127.0.0.1", "localhost", "[::1]"].map(str::to_owned).to_vec(),
             tls: false,
         }
@@ -203,6 +209,21 @@ mod tests {
             ("", Some("")),
         ] {
             assert_eq!(without_port(host), want, "{host}");
+        }
+    }
+
+    #[test]
+    fn cookies_are_named_after_the_port_that_the_browser_sees() {
+        for (host, tls, want) in [
+            ("localhost:8420", false, "frameless-8420"),
+            ("localhost:19001", false, "frameless-19001"),
+            ("[::1]:7", false, "frameless-7"),
+            ("[::1]", false, "frameless-80"),
+            ("localhost", true, "frameless-443"),
+        ] {
+            let mut headers = HeaderMap::new();
+            headers.insert(HOST, host.parse().unwrap());
+            assert_eq!(Guard { tls, ..guard() }.cookie(&headers), want, "{host}");
         }
     }
 

@@ -20,10 +20,12 @@ struct Client {
 }
 
 impl Roster {
-    /// A client more; it drives if nobody does.
+    /// A client more; it drives if it is the only one.
     pub(crate) fn join(&mut self, client: u32, token: Secret, mailbox: Arc<Mailbox>) {
+        if self.clients.is_empty() {
+            self.driver = Some(client);
+        }
         self.clients.insert(client, Client { token, mailbox });
-        self.driver.get_or_insert(client);
     }
 
     /// Who has that token.

@@ -80,7 +80,7 @@ async fn guarded(
     }
     let mut response = match admission {
         Ok(Admission::Enter) => next.run(request).await,
-        Ok(Admission::Exchange) => exchange(guard),
+        Ok(Admission::Exchange) => exchange(guard, request.headers()),
         Err(_) => (StatusCode::FORBIDDEN, TURNED_AWAY).into_response(),
     };
     // Of a request that is let in the host is one of ours.
@@ -95,10 +95,11 @@ const TURNED_AWAY: &str = "This page needs the whole address that frameless prin
 
 /// Gives the cookie, and leads on to the page. A redirect would not do: following a link from another site (a terminal in a browser), browsers
 /// leave strict cookies out of the redirected request, too.
-fn exchange(guard: &Guard) -> Response {
+fn exchange(guard: &Guard, headers: &HeaderMap) -> Response {
     let secure = if guard.tls { "; Secure" } else { "" };
     let secret = guard.secret.as_str();
-    let cookie = format!("{}={secret}; HttpOnly; SameSite=Strict; Path=/{secure}", guard.cookie);
+    let name = guard.cookie(headers);
+    let cookie = format!("{name}={secret}; HttpOnly; SameSite=Strict; Path=/{secure}");
     let page = "<!doctype html><meta charset=\"utf-8\"><meta http-equiv=\"refresh\" content=\"0;url=/\">\
                 <title>frameless</title><a href=\"/\">frameless</a>";
     let mut response = html(page.to_owned());

@@ -140,7 +140,6 @@ impl Server {
     fn shared(&self, hub: HubHandle, upload_bytes: u64) -> Shared {
         let guard = Guard {
             secret: self.secret.clone(),
-            cookie: format!("frameless-{}", self.address.port()),
             names: self.options.names(),
             tls: self.tls.is_some(),
         };

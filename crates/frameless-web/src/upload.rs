@@ -65,8 +65,7 @@ async fn ask<T>(
     shared.hub.events.send(event(answer)).await.map_err(|_| ending())?;
     match answered.await {
         Ok(answer) => answer.map_err(explain),
-        // Another scene has been asked for since.
-        Err(_) => Err((StatusCode::CONFLICT, "another scene was opened instead".to_owned())),
+        Err(_) => Err(ending()),
     }
 }
 

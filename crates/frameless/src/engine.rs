@@ -193,10 +193,14 @@ impl<T: Tracer> Engine<T> {
                 break;
             }
             let (now, count) = clock.next_batch(clock.batch_length());
-            if count == 0 {
+            let before = self.outstanding;
+            if count > 0 {
+                self.choose_and_submit(now, count);
+            }
+            // Nothing is due, or the sampler knows no pixel to look at.
+            if self.outstanding == before {
                 break;
             }
-            self.choose_and_submit(now, count);
         }
         if self.outstanding == 0 {
             self.clock.rest();
@@ -223,7 +227,12 @@ impl<T: Tracer> Engine<T> {
             if count == 0 {
                 return;
             }
+            let before = self.outstanding;
             self.choose_and_submit(now, count);
+            if self.outstanding == before {
+                // A sampler that knows no pixel to look at.
+                return;
+            }
         }
     }
 

@@ -86,7 +86,14 @@ impl<W: Send + 'static> Hub<W> {
         let wake = move || drop(events.try_send(Event::Woken));
         match Loading::start(name, open, move |scene| prepare(scene), wake) {
             Ok(loading) => self.opening = Some(Opening { loading, answer }),
-            Err(error) => self.roster.notice(Level::Error, error.to_string()),
+            Err(error) => {
+                let text = error.to_string();
+                if let Some(answer) = answer {
+                    // Fails if the client has gone.
+                    answer.send(Err(UploadRefused::Bad(text.clone()))).ok();
+                }
+                self.roster.notice(Level::Error, text);
+            }
         }
     }
 

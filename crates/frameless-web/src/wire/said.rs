@@ -143,6 +143,10 @@ impl Said {
     /// # Errors
     /// If it is no such message, or a number is out of its range.
     pub fn parse(text: &str) -> Result<Said, WireError> {
+        // An array of a kind and its fields would be understood, too.
+        if !text.trim_start().starts_with('{') {
+            return Err(WireError::Json("wanted an object".to_owned()));
+        }
         let said: Said =
             serde_json::from_str(text).map_err(|error| WireError::Json(error.to_string()))?;
         said.check()?;
