@@ -14,6 +14,7 @@ import pdoc.doc_pyi
 import pdoc.render
 
 import frameless
+from frameless import _frameless
 
 
 def stub_of(module: str) -> Path | None:
@@ -24,9 +25,11 @@ def stub_of(module: str) -> Path | None:
 def explained(shown: pdoc.doc.Class) -> str:
     """What is said of a class; of a compiled one how it is made, too, which pdoc does not see."""
     said = inspect.cleandoc(shown.obj.__doc__ or "")
-    if getattr(shown.obj, "__text_signature__", None) is None:
+    # The stub's class of that name knows what it says, but not how it is made.
+    compiled = getattr(_frameless, shown.name, shown.obj)
+    if getattr(compiled, "__text_signature__", None) is None:
         return said
-    return f"`{shown.name}{inspect.signature(shown.obj)}`\n\n{said}"
+    return f"`{shown.name}{inspect.signature(compiled)}`\n\n{said}"
 
 
 find_stub = pdoc.doc_pyi.find_stub_file

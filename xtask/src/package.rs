@@ -131,7 +131,7 @@ fn reference(out: &Path) -> Result<Done> {
         }
     }
     let page = std::fs::read_to_string(out.join("frameless.html"))?;
-    let is_explained = page.contains("Session(size, *, sampler=None") && page.contains("budget");
+    let is_explained = page.contains("sampler=None, reconstruction=") && page.contains("budget");
     ensure!(is_explained, "the reference does not say how a Session is made");
     Ok(Done::passed(format!("{}/index.html", out.display())))
 }

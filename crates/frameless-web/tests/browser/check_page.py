@@ -278,7 +278,15 @@ def sets_what_the_panel_offers(bench: Bench) -> str:
     page.locator("#temporal").fill("0.5")
     page.check("#antialias")
     other.wait("document.querySelector('#antialias').checked")
-    return "on this page and on another"
+    # Whoever has used the mouse goes on with the picture: the keys are its own again.
+    page.keyboard.press("Space")
+    other.wait("document.querySelector('#play').classList.contains('paused')")
+    assert page.is_checked("#antialias"), "the space bar was the box's"
+    page.locator("#theme").click()
+    page.keyboard.press("Space")
+    other.wait("!document.querySelector('#play').classList.contains('paused')")
+    page.locator("#theme").click()
+    return "on this page and on another; keys after clicks"
 
 
 def hands_the_helm_over(bench: Bench) -> str:

@@ -57,8 +57,8 @@ impl Reproject {
             let change = squared(rgb, before);
             if self.settled.count(request.pixel) > 0 {
                 let (rgb, is_noisy) = (kept.new[i], kept.is_noisy);
-                let begins = self.settled.verify(request.pixel, rgb, change, display, is_noisy);
-                if begins && change > VISIBLE {
+                let reaches_on = self.settled.verify(request.pixel, rgb, change, display, is_noisy);
+                if reaches_on && change > VISIBLE {
                     self.settled.begin_around(&self.store, &self.relight, [x, y], display);
                 }
             }

@@ -53,6 +53,8 @@ pub(super) const MOST_SAMPLES: u16 = u16::MAX;
 
 /// A sample at the centre that differs by no more (Σ over the channels) is the same.
 const SAME: f32 = 1e-6;
+/// Of a renderer with noise: so many variances are no other path of light, but another thing.
+const BEYOND_NOISE: f32 = 9.0;
 /// Before much is known of a pixel it is thought to spread by this (Σ over the channels): 9 % of the range.
 const FIRST_SPREAD: f32 = 0.025;
 /// How much of a tile's noise each sample renews.
@@ -165,8 +167,8 @@ impl Settled {
         Refinement { deviation, suspect }
     }
 
-    /// The sample at the centre has changed by `change` (Σ over the channels) to the linear `rgb`. Returns whether the pixel has begun
-    /// anew.
+    /// The sample at the centre has changed by `change` (Σ over the channels) to the linear `rgb`. Returns whether its neighbours
+    /// should begin anew, too.
     pub(super) fn verify(
         &mut self,
         pixel: u32,
@@ -187,7 +189,7 @@ impl Settled {
         } else if as_good < n {
             self.keep_only(pixel, as_good);
         }
-        as_good <= 1
+        as_good <= 1 && (!is_noisy || change > BEYOND_NOISE * variance)
     }
 
     fn keep_only(&mut self, pixel: usize, count: u16) {
