@@ -50,8 +50,8 @@ struct Refreshes {
 
 /// As a display does.
 const REFRESH_SECS: f64 = 1.0 / 60.0;
-/// Pictures that nobody has asked for take at most a fifth of the time.
-const COSTS_PER_REFRESH: f64 = 5.0;
+/// Pictures that nobody has asked for take at most an eighth of the time.
+const COSTS_PER_REFRESH: f64 = 8.0;
 
 /// Starting more takes longer than they save.
 const MOST_REFRESH_THREADS: usize = 8;
