@@ -19,6 +19,7 @@ pub struct Pace {
     paint_secs: f64,
     refresh_secs: f64,
     is_hurried: bool,
+    steered_until: Time,
 }
 
 // A little less than 1/60 s: where the display waits for its refresh, that sets the rate and not this.
@@ -29,6 +30,10 @@ const LONGEST_SECS: f64 = 1.0 / 20.0;
 const PAINT_SHARE: f64 = 0.25;
 // Of the loop's time, for making pictures. More starves the samples of which they are made.
 const REFRESH_SHARE: f64 = 0.42;
+// The same of those that nobody waits for while somebody steers: an answer has to wait for the picture that is being made.
+const STEERED_SHARE: f64 = 1.0 / 3.0;
+// So long after the last answer somebody still steers.
+const STEERED_SECS: f64 = 0.5;
 // The same where a user goes on doing something and looks for the answers.
 const HURRIED_SHARE: f64 = 0.5;
 // Of the rest that the samples are owed, so much may be put off: two or three refreshes of a window.
@@ -52,7 +57,10 @@ impl Pace {
     /// the next one: at once and not on average, since the first pictures of a large window cost most.
     pub fn made(&mut self, now: Time, refresh_secs: f64) {
         self.refresh_secs = refresh_secs;
-        self.is_hurried = false;
+        if std::mem::take(&mut self.is_hurried) {
+            self.steered_until = Time::from_secs(now.secs() + STEERED_SECS);
+        }
+        let share = if now < self.steered_until { STEERED_SHARE } else { REFRESH_SHARE };
         let rested = |from: Time, share: f64| {
             let rest_secs = refresh_secs * (1.0 / share - 1.0);
             Time::from_secs(from.secs() + rest_secs.min(LONGEST_REST_SECS))
@@ -62,7 +70,7 @@ impl Pace {
         self.owed_until = rested(owed_until.max(now), HURRIED_SHARE);
         let on_credit = Time::from_secs(self.owed_until.secs() - CREDIT_SECS);
         self.soonest = self.soonest.max(on_credit);
-        self.due = self.due.max(rested(now, REFRESH_SHARE));
+        self.due = self.due.max(rested(now, share));
     }
 
     /// Told when somebody has done something: the next picture shows it, and may come a little earlier than it would.
@@ -198,5 +206,20 @@ mod tests {
         assert_eq!(pace.ahead_secs(), 0.0, "whose answer must not wait for others");
         pace.made(ms(1050), 3.0);
         assert_eq!(pace.ahead_secs(), MOST_AHEAD_SECS);
+    }
+
+    #[test]
+    fn while_somebody_steers_the_loop_is_freer_for_the_next_answer() {
+        let rest_ms = |steers: bool| {
+            let mut pace = Pace::default();
+            assert!(pace.is_due(ms(1000)));
+            if steers {
+                pace.hurry();
+            }
+            pace.made(ms(1040), 0.04);
+            (1040..2000).find(|&now| pace.is_due(ms(now))).expect("due again") - 1040
+        };
+        assert_eq!(rest_ms(true), 80);
+        assert!((54..=57).contains(&rest_ms(false)), "{}", rest_ms(false));
     }
 }
