@@ -20,13 +20,7 @@ pub(crate) fn page(program: &Path, out: &Path) -> Result<Done> {
     if let Some(reason) = lacks(missing::to_open_a_report()) {
         return Ok(Done::skipped(reason));
     }
-    let mut checks = python();
-    checks.arg(format!("{FOLDER}/check_page.py")).arg(program).arg(out);
-    let output = output_within(&mut checks, CHECKS_WITHIN)?;
-    let text = String::from_utf8_lossy(&output.stdout);
-    eprint!("{text}");
-    ensure!(output.status.success(), "{}\n{}", last_line(&text), error_text(&output.stderr));
-    Ok(Done::passed(last_line(&text)))
+    check("check_page.py", program, out)
 }
 
 /// Lets Firefox do what browsers do each in their own way.
@@ -34,11 +28,17 @@ pub(crate) fn in_firefox(program: &Path, out: &Path) -> Result<Done> {
     if let Some(reason) = lacks(missing::to_open_firefox()) {
         return Ok(Done::skipped(reason));
     }
+    check("check_firefox.py", program, out)
+}
+
+fn check(script: &str, program: &Path, out: &Path) -> Result<Done> {
     let mut checks = python();
-    checks.arg(format!("{FOLDER}/check_firefox.py")).arg(program).arg(out);
+    checks.arg(format!("{FOLDER}/{script}")).arg(program).arg(out);
     let output = output_within(&mut checks, CHECKS_WITHIN)?;
-    ensure!(output.status.success(), "{}", error_text(&output.stderr));
-    Ok(Done::passed(last_line(&String::from_utf8_lossy(&output.stdout))))
+    let text = String::from_utf8_lossy(&output.stdout);
+    eprint!("{text}");
+    ensure!(output.status.success(), "{}\n{}", last_line(&text), error_text(&output.stderr));
+    Ok(Done::passed(last_line(&text)))
 }
 
 /// Measures latency, traffic and cost with an optimised program. The numbers are printed, and stay in `out`.

@@ -71,6 +71,11 @@ impl Clock {
         }
     }
 
+    /// Whether the renderer is given one batch at a time, see [`Clock::real_for_calls`].
+    pub(crate) fn awaits_each_call(&self) -> bool {
+        matches!(self, Clock::Real(Real { length: Some(_), .. }))
+    }
+
     /// Samples that the renderer traces in a batch's time.
     pub(crate) fn batch_length(&self) -> usize {
         match self {
@@ -187,12 +192,6 @@ impl Real {
             self.samples_per_sec += LEARNING_RATE * (measured - self.samples_per_sec);
         }
         self.last_answer = busy.then_some(now);
-    }
-
-    /// Whether the renderer may be given more than it is awaited for. The time until the next answer says nothing of how fast it is.
-    pub(crate) fn works_ahead(&mut self) -> bool {
-        self.last_answer = None;
-        self.length.is_none()
     }
 
     /// How many samples the renderer traces in so many seconds.

@@ -188,20 +188,7 @@ impl<T: Tracer> Engine<T> {
         {
             return self.step_call(wanted);
         }
-        while let Clock::Real(clock) = &mut self.clock {
-            if self.outstanding >= PIPELINE_DEPTH * clock.batch_length() {
-                break;
-            }
-            let (now, count) = clock.next_batch(clock.batch_length());
-            let before = self.outstanding;
-            if count > 0 {
-                self.choose_and_submit(now, count);
-            }
-            // Nothing is due, or the sampler knows no pixel to look at.
-            if self.outstanding == before {
-                break;
-            }
-        }
+        self.keep_busy(0.0);
         if self.outstanding == 0 {
             self.clock.rest();
             return Ok(0);
@@ -216,21 +203,28 @@ impl<T: Tracer> Engine<T> {
     /// Real clock, renderers that work by themselves: enough to do for so many seconds in which [`Engine::step`] will not be called, as
     /// while a picture is made.
     pub fn work_ahead(&mut self, secs: f64) {
-        while let Clock::Real(clock) = &mut self.clock
-            && clock.works_ahead()
-        {
+        if self.clock.awaits_each_call() {
+            return;
+        }
+        // The time until the next answer will say nothing of how fast the renderer is.
+        self.clock.answered(0, false);
+        self.keep_busy(secs);
+    }
+
+    /// Real clock: chooses batches until the renderer has enough to do for so many seconds, and for the choosing of the next.
+    fn keep_busy(&mut self, secs: f64) {
+        while let Clock::Real(clock) = &mut self.clock {
             let batch = clock.batch_length();
             if self.outstanding >= clock.samples_in(secs) + PIPELINE_DEPTH * batch {
                 return;
             }
             let (now, count) = clock.next_batch(batch);
-            if count == 0 {
-                return;
-            }
             let before = self.outstanding;
-            self.choose_and_submit(now, count);
+            if count > 0 {
+                self.choose_and_submit(now, count);
+            }
+            // Nothing is due, or the sampler knows no pixel to look at.
             if self.outstanding == before {
-                // A sampler that knows no pixel to look at.
                 return;
             }
         }
