@@ -288,6 +288,8 @@ def test_simulated_clocks_repeat_and_refuse_what_contradicts_them() -> None:
         ({"batch": -1}, "got -1"),
         ({"seed": -1}, "seed: wanted a whole number from 0"),
         ({"seed": 2**64}, "seed"),
+        ({"seed": -(2**200)}, "seed"),
+        ({"batch": 2**127}, "batch"),
         ({"sampler": "framed"}, "sampler: wanted one of random, permutation, change, adaptive; got"),
         ({"sampler": "change+filter"}, "sampler: wanted one of"),
         ({"sampler": "change(tile=0)"}, "tile at least 1"),

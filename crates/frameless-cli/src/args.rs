@@ -147,6 +147,9 @@ pub(crate) struct LookArgs {
     #[command(flatten)]
     pub(crate) light: LightArgs,
 
+    #[command(flatten)]
+    pub(crate) environment: EnvironmentArgs,
+
     /// Trace with so many threads; 0: one per core
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) threads: usize,
@@ -187,6 +190,7 @@ impl Default for ViewArgs {
             exposure: 0.0,
             tone_map: ToneMap::default(),
             light: LightArgs::default(),
+            environment: EnvironmentArgs::default(),
             threads: 0,
             seed: 1,
         };
@@ -232,7 +236,8 @@ pub(crate) struct CompareArgs {
 #[derive(ClapArgs)]
 #[command(after_help = "Examples:
   frameless render sphere --time 0.5 -o sphere.png
-  frameless render model.glb --time 0 --size 1920x1080 --camera 1 --exposure -1 -o model.png")]
+  frameless render model.glb --time 0 --size 1920x1080 --camera 1 --exposure -1 -o model.png
+  frameless render model.glb --env sky.hdr --env-rotation 90 --integrator path --samples 64 -o model.png")]
 pub(crate) struct RenderArgs {
     /// A glTF file or a built-in scene
     pub(crate) scene: String,
@@ -268,6 +273,9 @@ pub(crate) struct RenderArgs {
 
     #[command(flatten)]
     pub(crate) light: LightArgs,
+
+    #[command(flatten)]
+    pub(crate) environment: EnvironmentArgs,
 
     /// Samples per pixel: one at its centre, or so many spread over it
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -305,6 +313,32 @@ impl LightArgs {
     }
 }
 
+/// What is far away.
+#[derive(ClapArgs, Debug)]
+pub(crate) struct EnvironmentArgs {
+    /// Light the scene by a Radiance picture (.hdr) of all that is far away, which is seen behind it, too
+    ///
+    /// Latitude and longitude; the middle column is seen along +x. It takes the place of light that is added to files without any.
+    #[arg(long = "env", value_name = "FILE")]
+    pub(crate) file: Option<PathBuf>,
+
+    /// Turn the environment about the vertical, in degrees; positive turns what is along +z towards +x
+    #[arg(long = "env-rotation", value_name = "DEGREES", default_value = "0")]
+    #[arg(value_parser = parse::finite, allow_negative_numbers = true, requires = "file")]
+    pub(crate) rotation_deg: f64,
+
+    /// Multiply the environment's light
+    #[arg(long = "env-strength", value_name = "FACTOR", default_value = "1")]
+    #[arg(value_parser = parse::positive, requires = "file")]
+    pub(crate) strength: f64,
+}
+
+impl Default for EnvironmentArgs {
+    fn default() -> EnvironmentArgs {
+        EnvironmentArgs { file: None, rotation_deg: 0.0, strength: 1.0 }
+    }
+}
+
 fn integrator_names() -> clap::builder::PossibleValuesParser {
     clap::builder::PossibleValuesParser::new(Integrator::ALL.map(Integrator::name))
 }
@@ -336,6 +370,9 @@ pub(crate) struct TraceArgs {
     /// Which of the scene's cameras, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) camera: u32,
+
+    #[command(flatten)]
+    pub(crate) environment: EnvironmentArgs,
 }
 
 /// Tell what is in a scene: shapes, materials, textures, cameras, lights, motion, and what was ignored

@@ -3,10 +3,29 @@
 use std::path::Path;
 
 use anyhow::anyhow;
-use frameless_scene::{Animation, AnimationChoice, BUILTIN_NAMES, Choice, Limits, Scene};
+use frameless_scene::{
+    Animation, AnimationChoice, BUILTIN_NAMES, Choice, Environment, Limits, Scene, load_environment,
+};
 
-use crate::args::ChoiceArgs;
+use crate::args::{ChoiceArgs, EnvironmentArgs};
 use crate::failure::Failure;
+
+/// The scene of that name, lit by the environment, if one is asked for.
+pub(crate) fn lit_scene(
+    name: &str,
+    choice: &ChoiceArgs,
+    environment: &EnvironmentArgs,
+) -> Result<Scene, Failure> {
+    let mut scene = scene(name, choice)?;
+    if let Some(file) = &environment.file {
+        let picture = load_environment(file, &Limits::default()).map_err(Failure::bad_input)?;
+        // Turned by whole turns, a large angle is the same in single precision.
+        let rotation_rad = (environment.rotation_deg % 360.0).to_radians() as f32;
+        let strength = environment.strength.min(f64::from(f32::MAX)) as f32;
+        scene.light_by(Environment { rotation_rad, strength, ..picture });
+    }
+    Ok(scene)
+}
 
 /// The built-in scene of that name, else the file, of which a part may be chosen. A file in the way of a built-in name is
 /// reached as `./sphere`.

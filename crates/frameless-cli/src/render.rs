@@ -15,7 +15,7 @@ use crate::{input, output};
 /// Trace every pixel's centre and write the picture.
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     output::check_png_path(&args.out)?;
-    let scene = input::scene(&args.scene, &args.choice)?;
+    let scene = input::lit_scene(&args.scene, &args.choice, &args.environment)?;
     let view = ViewSource::Camera(input::camera(&scene, args.camera)?);
 
     let waiting = waiting();

@@ -21,7 +21,7 @@ pub(crate) fn run(args: &TraceArgs) -> Result<(), Failure> {
             size.height
         )));
     }
-    let scene = input::scene(&args.scene, &args.choice)?;
+    let scene = input::lit_scene(&args.scene, &args.choice, &args.environment)?;
     let view = ViewSource::Camera(input::camera(&scene, args.camera)?);
     let world = World::new(Arc::new(scene));
     let request = Request::centre(size.index(x, y));

@@ -49,7 +49,7 @@ pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
 
 /// The scene that is looked at, with the camera that is wanted as its first.
 pub(crate) fn scene(args: &LookArgs) -> Result<Scene, Failure> {
-    let mut scene = input::scene(&args.scene, &args.choice)?;
+    let mut scene = input::lit_scene(&args.scene, &args.choice, &args.environment)?;
     let first = input::camera(&scene, args.camera)?;
     scene.cameras.rotate_left(first as usize);
     Ok(scene)

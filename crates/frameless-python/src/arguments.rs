@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use frameless::{ReconstructionKind, SamplerKind};
 use frameless_eval::sampler_from_name;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyOverflowError, PyValueError};
 use pyo3::prelude::*;
 
 /// A sampler by name, with its parameters in brackets.
@@ -21,7 +21,22 @@ pub(crate) fn reconstruction_kind(name: &str) -> PyResult<ReconstructionKind> {
     })
 }
 
-/// A whole number that Python has given as one of any size.
+/// A whole number of any size: what has more than 128 bits, which nothing takes, counts as the nearest that has not.
+pub(crate) fn any_size(value: &Bound<'_, PyAny>) -> PyResult<i128> {
+    match value.extract::<i128>() {
+        Err(error) if error.is_instance_of::<PyOverflowError>(value.py()) => {
+            Ok(if value.lt(0)? { i128::MIN } else { i128::MAX })
+        }
+        number => number,
+    }
+}
+
+/// The same, or None.
+pub(crate) fn any_size_or_none(value: &Bound<'_, PyAny>) -> PyResult<Option<i128>> {
+    if value.is_none() { Ok(None) } else { any_size(value).map(Some) }
+}
+
+/// A whole number of [`any_size`], if it lies `within`.
 pub(crate) fn whole<T: TryFrom<i128> + Into<i128> + Copy>(
     name: &str,
     value: i128,
@@ -30,7 +45,12 @@ pub(crate) fn whole<T: TryFrom<i128> + Into<i128> + Copy>(
     let (least, most): (i128, i128) = ((*within.start()).into(), (*within.end()).into());
     let fits = (least..=most).contains(&value).then(|| T::try_from(value).ok()).flatten();
     fits.ok_or_else(|| {
-        let message = format!("{name}: wanted a whole number from {least} to {most}, got {value}");
+        let came = match value {
+            i128::MIN => "-2**127 or less".to_owned(),
+            i128::MAX => "2**127 or more".to_owned(),
+            value => value.to_string(),
+        };
+        let message = format!("{name}: wanted a whole number from {least} to {most}, got {came}");
         PyValueError::new_err(message)
     })
 }

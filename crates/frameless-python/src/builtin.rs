@@ -8,7 +8,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arguments::{sampler_kind, whole};
+use crate::arguments::{any_size, sampler_kind, whole};
 use crate::array;
 use crate::canvas::{PyCanvas, checked};
 use crate::handed_on;
@@ -101,7 +101,7 @@ impl BuiltinSampler {
 impl BuiltinSampler {
     #[new]
     #[pyo3(signature = (name, seed=1))]
-    fn new(name: String, seed: i128) -> PyResult<BuiltinSampler> {
+    fn new(name: String, #[pyo3(from_py_with = any_size)] seed: i128) -> PyResult<BuiltinSampler> {
         let (kind, seed) = (sampler_kind(&name)?, whole("seed", seed, 0..=u64::MAX)?);
         let sampler =
             Mutex::new(Learned { sampler: kind.build(seed), size: None, spare: VecDeque::new() });
@@ -121,7 +121,7 @@ impl BuiltinSampler {
         &self,
         now: f64,
         canvas: &Bound<'py, PyAny>,
-        count: i128,
+        #[pyo3(from_py_with = any_size)] count: i128,
     ) -> PyResult<Bound<'py, PyArray1<u32>>> {
         let now = checked(now)?;
         let count = whole("count", count, 0..=MOST_PIXELS)? as usize;

@@ -12,7 +12,7 @@ use numpy::prelude::*;
 use pyo3::exceptions::{PyOSError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arguments::whole;
+use crate::arguments::{any_size, whole};
 use crate::array;
 use crate::camera::Camera;
 use crate::interrupt::interruptible;
@@ -191,7 +191,7 @@ impl Scene {
 
     /// One of the scene's cameras as it is at a time (seconds).
     #[pyo3(signature = (index=0, time=0.0))]
-    fn camera(&self, index: i128, time: f64) -> PyResult<Camera> {
+    fn camera(&self, #[pyo3(from_py_with = any_size)] index: i128, time: f64) -> PyResult<Camera> {
         let (index, secs) = (self.checked_camera(index)?, Scene::checked_secs(time)?);
         let view = self.scene().view_at(&self.scene().state_at(secs), index);
         Ok(Camera::from_view(view, 1.0))
@@ -226,7 +226,7 @@ impl Scene {
             None => ViewSource::Camera(0),
             Some(camera) => match camera.extract::<Camera>() {
                 Ok(camera) => ViewSource::Free(*camera.view()),
-                Err(_) => match camera.extract::<i128>() {
+                Err(_) => match any_size(&camera) {
                     Ok(number) => ViewSource::Camera(self.checked_camera(number)?),
                     Err(_) => {
                         let came = camera.repr()?;

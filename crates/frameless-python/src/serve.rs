@@ -13,7 +13,7 @@ use pyo3::exceptions::{PyOSError, PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::{PyTraverseError, PyVisit};
 
-use crate::arguments::{positive, reconstruction_kind, stops, whole};
+use crate::arguments::{any_size, positive, reconstruction_kind, stops, whole};
 use crate::calls::Calls;
 use crate::camera::Camera;
 use crate::interrupt::LOOK_EVERY;
@@ -226,7 +226,7 @@ pub(crate) fn start_serving(
     budget: Option<f64>,
     exposure: f64,
     noisy: bool,
-    port: i128,
+    #[pyo3(from_py_with = any_size)] port: i128,
     allow_frame: Option<String>,
 ) -> PyResult<Served> {
     if !render.is_callable() {

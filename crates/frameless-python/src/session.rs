@@ -11,7 +11,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use pyo3::{PyTraverseError, PyVisit};
 
-use crate::arguments::{finite, positive, reconstruction_kind, stops, whole};
+use crate::arguments::{
+    any_size, any_size_or_none, finite, positive, reconstruction_kind, stops, whole,
+};
 use crate::array;
 use crate::batch::Batch;
 use crate::batches::Batches;
@@ -131,8 +133,8 @@ impl Session {
         sampler: Option<Bound<'_, PyAny>>,
         reconstruction: &str,
         camera: Option<Camera>,
-        seed: i128,
-        batch: Option<i128>,
+        #[pyo3(from_py_with = any_size)] seed: i128,
+        #[pyo3(from_py_with = any_size_or_none)] batch: Option<i128>,
         batch_ms: f64,
         budget: Option<f64>,
         simulated: Option<f64>,

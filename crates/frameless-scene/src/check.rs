@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use crate::{
     Channel, Deformation, Geometry, Influences, Interpolation, Mesh, Projection, Scene, Target,
-    Values,
+    UV_SETS, Values,
 };
 
 /// How far from 1 the length of a unit vector or quaternion may be: a few roundings.
@@ -47,14 +47,13 @@ impl Scene {
             wanted(within(texture.image, &self.images), &format!("texture {i}: an image"))?;
         }
         for (i, material) in self.materials.iter().enumerate() {
-            let texture = material.base_color_texture;
-            let found = texture.is_none_or(|t| within(t.texture, &self.textures) && t.uv_set < 2);
-            wanted(found, &format!("material {i}: a texture"))?;
-            let numbers = material.base_color.is_finite()
-                && material.emissive.is_finite()
-                && (0.0..=1.0).contains(&material.metallic)
-                && (0.0..=1.0).contains(&material.roughness);
-            wanted(numbers, &format!("material {i}: finite colours, factors in [0, 1]"))?;
+            let found = material.textures().all(|(reference, _)| {
+                within(reference.texture, &self.textures)
+                    && (reference.uv_set as usize) < UV_SETS
+                    && reference.picture_from_uv.is_finite()
+            });
+            wanted(found, &format!("material {i}: textures, found by finite coordinates"))?;
+            material.check().map_err(|why| format!("material {i}: {why}"))?;
         }
         Ok(())
     }
@@ -130,7 +129,10 @@ impl Scene {
                 &format!("camera {i}: a node, an angle"),
             )?;
         }
-        wanted(!self.lights.is_empty() || self.ambient != Vec3::ZERO, "some light")?;
+        let environment = self.environment.as_ref();
+        wanted(environment.is_none_or(|e| e.is_sane()), "an environment of finite texels")?;
+        let is_lit = !self.lights.is_empty() || self.ambient != Vec3::ZERO || environment.is_some();
+        wanted(is_lit, "some light")?;
         let backdrop = [self.ambient, self.sky[0], self.sky[1]];
         wanted(backdrop.iter().all(|c| c.is_finite()), "finite ambient and sky")?;
         for (i, light) in self.lights.iter().enumerate() {
@@ -206,8 +208,15 @@ fn check_mesh(mesh: &Mesh, materials: usize) -> Result<(), String> {
     let uvs = mesh.uvs.iter().flatten();
     wanted(uvs.into_iter().all(|uv| uv.is_finite()), "finite texture coordinates")?;
     wanted(mesh.colors.iter().all(|color| color.is_finite()), "finite colours")?;
-    let lengths = [mesh.normals.len(), mesh.uvs[0].len(), mesh.uvs[1].len(), mesh.colors.len()];
-    wanted(lengths.iter().all(|&n| n == 0 || n == vertices), "as many attributes as positions")?;
+    let sets = mesh.uvs.iter().map(Vec::len);
+    let mut lengths = sets.chain([mesh.normals.len(), mesh.colors.len()]);
+    wanted(lengths.all(|n| n == 0 || n == vertices), "as many attributes as positions")?;
+    let corners = [0, 3 * mesh.triangles.len()].contains(&mesh.tangents.len());
+    let known = mesh.tangents.iter().all(|t| {
+        let length = t.truncate().length();
+        t.w.abs() == 1.0 && (length == 0.0 || is_unit(length))
+    });
+    wanted(corners && known, "three unit tangents per triangle")?;
     let in_bounds = mesh.triangles.iter().flatten().all(|&v| (v as usize) < vertices);
     wanted(in_bounds, "triangles of existing vertices")?;
     check_targets(mesh)?;

@@ -8,6 +8,12 @@ use std::ops::Range;
 use glam::{Affine3A, Quat, Vec2, Vec3, Vec4};
 
 use crate::animation::Animation;
+use crate::environment::Environment;
+use crate::material::Material;
+use crate::texture::{Image, Texture};
+
+/// Sets of texture coordinates that a mesh may have.
+pub const UV_SETS: usize = 4;
 
 /// Everything that can be seen, at all times.
 #[derive(Clone, Debug, Default)]
@@ -34,13 +40,17 @@ pub struct Scene {
     pub morph_weights: Vec<f32>,
     /// Views that the file offers; never empty after loading.
     pub cameras: Vec<Camera>,
-    /// Light sources; may be empty only if `ambient` is not black.
+    /// Light sources; may be empty only if `ambient` is not black, or there is an environment.
     pub lights: Vec<Light>,
+    /// Whether the lights and `ambient` stand in for those that the file does not have.
+    pub has_added_light: bool,
     /// Radiance that reaches every surface from everywhere, linear RGB.
     pub ambient: Vec3,
     /// Radiance of the sky straight down (x, y, z of `sky[0]`) and straight up (`sky[1]`), linear RGB; in
-    /// between: mixed by the direction's y.
+    /// between: mixed by the direction's y. An environment takes its place.
     pub sky: [Vec3; 2],
+    /// A picture of all that is far away, which lights the scene.
+    pub environment: Option<Environment>,
     /// What moves.
     pub animation: Animation,
     /// What was ignored or replaced while loading, each said once.
@@ -49,6 +59,20 @@ pub struct Scene {
     pub notes: Vec<String>,
     /// What else the file offers.
     pub contents: Contents,
+}
+
+impl Scene {
+    /// What a material gives off on average over its texture, linear RGB; nothing if it is shown unlit.
+    pub fn mean_radiance(&self, material: &Material) -> Vec3 {
+        if material.emissive == Vec3::ZERO || material.unlit {
+            return Vec3::ZERO;
+        }
+        let mean = material.emissive_texture.map_or(Vec4::ONE, |reference| {
+            let texture = self.textures[reference.texture as usize];
+            self.images[texture.image as usize].mean_light()
+        });
+        material.emissive * mean.truncate()
+    }
 }
 
 /// The scenes and animations of the file, for whoever wants to choose others. Empty for built-in scenes.
@@ -88,10 +112,13 @@ pub struct Mesh {
     pub positions: Vec<Vec3>,
     /// Unit length; empty: flat shading.
     pub normals: Vec<Vec3>,
-    /// Texture coordinates, set 0 and set 1.
-    pub uvs: [Vec<Vec2>; 2],
+    /// Texture coordinates, set by set.
+    pub uvs: [Vec<Vec2>; UV_SETS],
     /// Linear RGBA that multiplies the base colour.
     pub colors: Vec<Vec4>,
+    /// Three per triangle, or none: where a normal map's x axis points at each corner (a unit vector, or zero where nobody knows),
+    /// and in w the sign of its y axis, bitangent = w · normal × tangent.
+    pub tangents: Vec<Vec4>,
     /// Three vertices each, counter-clockwise seen from the front; in bounds.
     pub triangles: Vec<[u32; 3]>,
     /// Index into [`Scene::materials`], per triangle.
@@ -120,98 +147,6 @@ pub struct Influences {
     pub joints: Vec<[u16; 4]>,
     /// At least 0; over all sets of a mesh, a vertex's sum to 1.
     pub weights: Vec<[f32; 4]>,
-}
-
-/// A metallic-roughness surface (glTF 2.0 §3.9).
-#[derive(Clone, Debug)]
-pub struct Material {
-    /// As in the file; may be empty.
-    pub name: String,
-    /// Linear RGBA.
-    pub base_color: Vec4,
-    /// Multiplies `base_color`; sRGB-encoded image.
-    pub base_color_texture: Option<TextureRef>,
-    /// 0: dielectric, 1: metal.
-    pub metallic: f32,
-    /// 0: mirror, 1: matte.
-    pub roughness: f32,
-    /// How strongly a dielectric reflects, from 0 (not at all) to 1 (as glass does); the factor of KHR_materials_specular. Metals do
-    /// not know it.
-    pub specular: f32,
-    /// Linear RGB radiance given off.
-    pub emissive: Vec3,
-    /// Whether back faces are seen.
-    pub double_sided: bool,
-}
-
-impl Default for Material {
-    /// glTF's default material: white, metallic 1, roughness 1 per the specification; ours is a matte
-    /// white dielectric since that is what viewers show for primitives without a material.
-    fn default() -> Self {
-        Material {
-            name: String::new(),
-            base_color: Vec4::ONE,
-            base_color_texture: None,
-            metallic: 0.0,
-            roughness: 1.0,
-            specular: 1.0,
-            emissive: Vec3::ZERO,
-            double_sided: false,
-        }
-    }
-}
-
-/// Which texture, with which of the mesh's texture coordinates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TextureRef {
-    /// Index into [`Scene::textures`].
-    pub texture: u32,
-    /// Index into [`Mesh::uvs`].
-    pub uv_set: u32,
-}
-
-/// An image and the way it is looked up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Texture {
-    /// Index into [`Scene::images`].
-    pub image: u32,
-    /// Outside [0, 1) horizontally and vertically.
-    pub wrap: [Wrap; 2],
-    /// Between texels.
-    pub filter: Filter,
-}
-
-/// What lies outside [0, 1).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Wrap {
-    /// The image again.
-    #[default]
-    Repeat,
-    /// The image mirrored, then again.
-    MirroredRepeat,
-    /// The border texel.
-    ClampToEdge,
-}
-
-/// What lies between texel centres.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Filter {
-    /// The nearest texel.
-    Nearest,
-    /// The four texels around, by distance.
-    #[default]
-    Linear,
-}
-
-/// A decoded picture: row-major from the top, 8 bits per channel, sRGB-encoded RGB with linear alpha.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Image {
-    /// Texels per row; at least 1.
-    pub width: u32,
-    /// Rows; at least 1.
-    pub height: u32,
-    /// `width · height` texels.
-    pub rgba: Vec<[u8; 4]>,
 }
 
 /// A place in the transform hierarchy.

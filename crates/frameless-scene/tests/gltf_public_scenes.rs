@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use frameless_scene::{Geometry, Limits, Problem, Scene, load};
+use frameless_scene::{AlphaMode, Geometry, Limits, Material, Problem, Scene, load};
 use serde_json::Value;
 
 /// `../shared` beside the project, unless it is missing: aloud, and not in CI.
@@ -38,6 +38,23 @@ fn expected_triangles(asset: &Value) -> usize {
     }
 }
 
+#[derive(PartialEq)]
+enum Mode {
+    Opaque,
+    Mask,
+    Blend,
+}
+
+impl Mode {
+    fn of(material: &Material) -> Mode {
+        match material.alpha_mode {
+            AlphaMode::Opaque => Mode::Opaque,
+            AlphaMode::Mask { .. } => Mode::Mask,
+            AlphaMode::Blend => Mode::Blend,
+        }
+    }
+}
+
 fn complaints(scene: &Scene, asset: &Value) -> Vec<String> {
     let mut complaints = Vec::new();
     let mut expect = |what: &str, came: f64, expected: f64| {
@@ -61,9 +78,13 @@ fn complaints(scene: &Scene, asset: &Value) -> Vec<String> {
         f64::from(*skins != 0 || *targets != 0),
     );
     expect("warned of deformation", f64::from(has("skin") || has("morph")), 0.0);
+    expect("warned of a material", f64::from(has("material \"") && has("not drawn")), 0.0);
     let modes = asset["alpha_modes"].as_array().unwrap();
-    let transparent = modes.iter().any(|mode| *mode != "OPAQUE");
-    expect("alpha warned of", f64::from(has("alpha mode")), f64::from(transparent));
+    for (name, mode) in [("MASK", Mode::Mask), ("BLEND", Mode::Blend)] {
+        let wanted = modes.iter().any(|mode| *mode == name);
+        let came = scene.materials.iter().any(|material| Mode::of(material) == mode);
+        expect(name, f64::from(came), f64::from(wanted));
+    }
     if has("checker") {
         complaints.push(format!("{:?}", scene.warnings));
     }

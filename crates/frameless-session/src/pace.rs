@@ -30,8 +30,9 @@ const LONGEST_SECS: f64 = 1.0 / 20.0;
 const PAINT_SHARE: f64 = 0.25;
 // Of the loop's time, for making pictures. More starves the samples of which they are made.
 const REFRESH_SHARE: f64 = 0.42;
-// The same of those that nobody waits for while somebody steers: an answer has to wait for the picture that is being made.
-const STEERED_SHARE: f64 = 1.0 / 3.0;
+// The same of those that nobody waits for while somebody steers: an answer has to wait for the picture that is being made. The
+// smaller one as long as that leaves 20 Hz.
+const STEERED_SHARES: [f64; 2] = [1.0 / 4.0, 1.0 / 3.0];
 // So long after the last answer somebody still steers.
 const STEERED_SECS: f64 = 0.5;
 // The same where a user goes on doing something and looks for the answers.
@@ -60,17 +61,26 @@ impl Pace {
         if std::mem::take(&mut self.is_hurried) {
             self.steered_until = Time::from_secs(now.secs() + STEERED_SECS);
         }
-        let share = if now < self.steered_until { STEERED_SHARE } else { REFRESH_SHARE };
-        let rested = |from: Time, share: f64| {
-            let rest_secs = refresh_secs * (1.0 / share - 1.0);
-            Time::from_secs(from.secs() + rest_secs.min(LONGEST_REST_SECS))
+        let rest_secs = |share: f64| refresh_secs * (1.0 / share - 1.0);
+        let after =
+            |from: Time, secs: f64| Time::from_secs(from.secs() + secs.min(LONGEST_REST_SECS));
+        let unhurried_secs = match self.is_steered(now) {
+            true => {
+                let [long, short] = STEERED_SHARES.map(rest_secs);
+                (LONGEST_SECS - refresh_secs).clamp(short, long)
+            }
+            false => rest_secs(REFRESH_SHARE),
         };
         // Nothing was paid back while this one was made.
         let owed_until = Time::from_secs(self.owed_until.secs() + refresh_secs);
-        self.owed_until = rested(owed_until.max(now), HURRIED_SHARE);
+        self.owed_until = after(owed_until.max(now), rest_secs(HURRIED_SHARE));
         let on_credit = Time::from_secs(self.owed_until.secs() - CREDIT_SECS);
         self.soonest = self.soonest.max(on_credit);
-        self.due = self.due.max(rested(now, share));
+        self.due = self.due.max(after(now, unhurried_secs));
+    }
+
+    fn is_steered(&self, now: Time) -> bool {
+        now < self.steered_until
     }
 
     /// Told when somebody has done something: the next picture shows it, and may come a little earlier than it would.
@@ -80,9 +90,12 @@ impl Pace {
     }
 
     /// For how many seconds the renderer should have something to do while the next picture is made: as long as the last one took; if
-    /// somebody waits for it, not at all.
-    pub fn ahead_secs(&self) -> f64 {
-        if self.is_hurried { 0.0 } else { self.refresh_secs.min(MOST_AHEAD_SECS) }
+    /// somebody waits for it, or might before it is made, not at all: it would take longer.
+    pub fn ahead_secs(&self, now: Time) -> f64 {
+        if self.is_hurried || self.is_steered(now) {
+            return 0.0;
+        }
+        self.refresh_secs.min(MOST_AHEAD_SECS)
     }
 
     /// Whether a picture is due; if so, the next one is due an interval later.
@@ -199,27 +212,29 @@ mod tests {
     #[test]
     fn the_renderer_has_work_while_a_picture_is_made_that_nobody_waits_for() {
         let mut pace = Pace::default();
-        assert_eq!(pace.ahead_secs(), 0.0, "nobody knows how long it will take");
+        assert_eq!(pace.ahead_secs(ms(990)), 0.0, "nobody knows how long it will take");
         pace.made(ms(1000), 0.008);
-        assert_eq!(pace.ahead_secs(), 0.008);
+        assert_eq!(pace.ahead_secs(ms(1020)), 0.008);
         pace.hurry();
-        assert_eq!(pace.ahead_secs(), 0.0, "whose answer must not wait for others");
+        assert_eq!(pace.ahead_secs(ms(1040)), 0.0, "whose answer must not wait for others");
         pace.made(ms(1050), 3.0);
-        assert_eq!(pace.ahead_secs(), MOST_AHEAD_SECS);
+        assert_eq!(pace.ahead_secs(ms(1060)), 0.0, "who has just done something will again");
+        assert_eq!(pace.ahead_secs(ms(1600)), MOST_AHEAD_SECS);
     }
 
     #[test]
     fn while_somebody_steers_the_loop_is_freer_for_the_next_answer() {
-        let rest_ms = |steers: bool| {
+        let rest_ms = |steers: bool, takes_ms: u64| {
             let mut pace = Pace::default();
             assert!(pace.is_due(ms(1000)));
             if steers {
                 pace.hurry();
             }
-            pace.made(ms(1040), 0.04);
-            (1040..2000).find(|&now| pace.is_due(ms(now))).expect("due again") - 1040
+            let made = 1000 + takes_ms;
+            pace.made(ms(made), 1e-3 * takes_ms as f64);
+            (made..2000).find(|&now| pace.is_due(ms(now))).expect("due again") - made
         };
-        assert_eq!(rest_ms(true), 80);
-        assert!((54..=57).contains(&rest_ms(false)), "{}", rest_ms(false));
+        assert_eq!([10, 14, 40].map(|takes_ms| rest_ms(true, takes_ms)), [30, 36, 80]);
+        assert_eq!([10, 14, 40].map(|takes_ms| rest_ms(false, takes_ms)), [14, 20, 56]);
     }
 }

@@ -129,7 +129,7 @@ fn run<S: Stage>(
         }
         if wanted.is_some() && session.is_worth_showing() && pace.is_due(session.now()) {
             let begin = session.now();
-            session.work_ahead(pace.ahead_secs());
+            session.work_ahead(pace.ahead_secs(begin));
             let picture = session.picture(wanted.take().unwrap_or_default());
             let ready = session.now();
             pace.made(ready, ready.secs_since(begin));

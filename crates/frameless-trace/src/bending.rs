@@ -244,7 +244,7 @@ fn smooth_normals_turn_with_the_joint() {
     let moment = world.moment(1.0);
     let ray = ray(Vec3::new(0.05, 0.05, 5.0), Vec3::NEG_Z);
     let hit = moment.targets(&world).closest(&ray, &mut Stack::new()).expect("the ball");
-    let point = crate::point::Point::new(&world, &moment, &ray, &hit);
+    let point = crate::point::Point::new(&world, &moment, &ray, &hit, Default::default());
     // What was at the top, at (0.05, 1, -0.05), looks along +z now.
     assert!(point.normal.abs_diff_eq(Vec3A::new(0.05, 0.05, 1.0).normalize(), 0.02), "{point:?}");
     let [a, b, c] = point.anchor.to_array();

@@ -5,6 +5,7 @@ use frameless_scene::{Projection, Scene, State, View};
 use glam::{Affine3A, DAffine3, DMat4, DVec4, Mat3A, Vec3A};
 
 use crate::ray::Ray;
+use crate::texture::Cone;
 
 /// Who looks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,6 +72,17 @@ impl Camera {
 }
 
 impl Camera {
+    /// How much of what it sees a pixel is wide; in the middle of a perspective picture, which is wider than its edges.
+    #[inline]
+    pub(crate) fn cone(&self) -> Cone {
+        let pixel = 2.0 * self.half[1] / self.size.height as f32;
+        if self.is_perspective {
+            Cone { width_m: 0.0, spread: pixel }
+        } else {
+            Cone { width_m: pixel, spread: 0.0 }
+        }
+    }
+
     /// Where points given in some coordinates are in the picture: the inverse of [`Camera::ray`]. Multiplied out in
     /// double precision, so that distant scenes keep their sub-pixel positions.
     pub fn picture_from(&self, world_from_object: &Affine3A) -> PictureFrom {

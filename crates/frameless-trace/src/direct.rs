@@ -1,24 +1,37 @@
-//! The integrator `direct`: light sources seen directly, and in mirrors. Deterministic (Whitted 1980).
+//! The integrator `direct`: light sources seen directly, in mirrors and through glass. Deterministic (Whitted 1980).
 //!
-//! L = emissive + (1 − m)·base·(ambient + Σ_lights E cosθ V / π) + m·base·L(reflected)
+//! L = a (emissive + matte·(o·ambient + Σ_lights E cosθ V / π) + mirrored·L(reflected) + passed·L(refracted)) + (1 − a) L(behind)
 //!
-//! with E the light's irradiance, V its visibility (a hard shadow) and m the mirror weight, see [`mirror_weight`]. Both sides
-//! of every surface are drawn, the normal turned towards the viewer: a back face that is culled would let light through
-//! walls. Until there is a full BRDF, rough metals are matte in their base colour instead of black.
-
-use std::f32::consts::FRAC_1_PI;
+//! with E the light's irradiance, V which part of it arrives (a hard shadow, lighter behind what lets light pass), o the texture of
+//! occlusion, a the alpha of what blends, and the surface's [`Shares`]. Ways are followed one after the other; those that would show less
+//! than 1/512 of what they lead to, and those after the 32nd branch, are left out.
+//!
+//! The camera does not see the backs of single-sided surfaces, as in viewers that rasterise. All other rays meet both sides of every
+//! surface, the normal turned towards where they come from: a back that is culled would let light through walls.
 
 use frameless::Surface;
-use frameless_scene::Material;
+use frameless_scene::{AlphaMode, Material};
 use glam::{Vec3, Vec3A};
 
+use crate::asking::Asked;
 use crate::first::FirstSurface;
+use crate::fresnel::refracted;
+use crate::holes::{Chance, attenuation};
 use crate::integrator::Settings;
 use crate::moment::Moment;
 use crate::point::Point;
-use crate::ray::Ray;
+use crate::ray::{Hit, Ray};
+use crate::shares::{Shares, mirror_weight};
+use crate::texture::Cone;
 use crate::traverse::Stack;
 use crate::world::World;
+
+/// Surfaces that blend, one behind the other, before one counts as opaque.
+const MOST_LAYERS: u32 = 16;
+/// Ways besides the first one that a sample follows.
+const MOST_BRANCHES: u32 = 32;
+/// Of what a way leads to, less would hardly be seen.
+const LEAST_SHOWN: f32 = 1.0 / 512.0;
 
 /// Is told what happens to a ray; see [`crate::explain`].
 pub(crate) trait Probe {
@@ -33,63 +46,146 @@ impl Probe for NoProbe {
     fn note(&mut self, _line: impl FnOnce() -> String) {}
 }
 
+/// A ray to be followed.
+#[derive(Clone, Copy)]
+struct Leg {
+    ray: Ray,
+    cone: Cone,
+    /// The part of its light that is seen.
+    throughput: Vec3A,
+    /// Reflections and refractions before it.
+    depth: u32,
+    /// Surfaces that blend before it.
+    layers: u32,
+    /// Absorption per metre of what it is inside, if that is known.
+    inside: Option<Vec3A>,
+    /// Whether it goes on straight from the camera.
+    from_camera: bool,
+    /// Whether it passes backs: it has met one already.
+    culls: bool,
+}
+
+/// What comes of the rays so far.
+struct Picture {
+    radiance: Vec3A,
+    first: FirstSurface,
+    waiting: Vec<Leg>,
+    branches: u32,
+}
+
 impl World {
     /// What comes back along a ray.
     pub(crate) fn radiance(
         &self,
         moment: &Moment,
-        mut ray: Ray,
+        (ray, cone): (Ray, Cone),
         settings: &Settings,
         stack: &mut Stack,
         probe: &mut impl Probe,
     ) -> ([f32; 3], Surface) {
-        let mut radiance = Vec3A::ZERO;
-        let mut throughput = Vec3A::ONE;
-        let mut first = FirstSurface::default();
-        for depth in 0..=settings.max_depth {
-            probe
-                .note(|| format!("ray {depth}: from {:.5} along {:.5}", ray.origin, ray.direction));
-            let Some(hit) = moment.targets(self).closest(&ray, stack) else {
-                let sky = self.sky(ray.direction);
-                let gives = throughput * sky;
-                probe.note(|| {
-                    format!(
-                        "  nothing hit: sky {sky:.5}, throughput {throughput:.5}: adds {gives:.6}"
-                    )
-                });
-                radiance += gives;
-                first.see(self, || sky_surface(&ray), throughput);
-                break;
-            };
-            probe.note(|| format!("  {hit:?}"));
-            let point = Point::new(self, moment, &ray, &hit);
-            let material = &self.scene().materials[point.material as usize];
-            let mirror = if depth < settings.max_depth { mirror_weight(material) } else { 0.0 };
-            probe.note(|| describe(&point, material, mirror));
-            let albedo = (1.0 - mirror) * point.base;
-            let (irradiance, lit) = self.direct_light(moment, &point, settings, stack, probe);
-            let emissive = Vec3A::from(material.emissive);
-            let ambient = Vec3A::from(self.scene().ambient);
-            let gives = throughput * (emissive + albedo * (ambient + irradiance));
-            probe.note(|| format!("  ambient {ambient:.5} per albedo; emits {emissive:.5}"));
-            probe.note(|| {
-                format!("  albedo {albedo:.5}, throughput {throughput:.5}: adds {gives:.6}")
-            });
-            radiance += gives;
-            first.see(self, || point.surface(&hit, albedo, irradiance, lit), throughput);
-            if depth == 0 && settings.surfaces {
-                first.look_into_mirror(self, moment, &hit, ray.direction);
-            }
-            throughput *= mirror * point.base;
-            if throughput == Vec3A::ZERO {
-                break;
-            }
-            ray = Ray { origin: point.outside, direction: reflect(ray.direction, &point) };
-        }
-        (finite(radiance), first.surface(&ray))
+        let mut picture = Picture {
+            radiance: Vec3A::ZERO,
+            first: FirstSurface::default(),
+            waiting: Vec::new(),
+            branches: 0,
+        };
+        let throughput = Vec3A::ONE;
+        let (depth, layers, inside, from_camera, culls) = (0, 0, None, true, false);
+        let mut leg = Leg { ray, cone, throughput, depth, layers, inside, from_camera, culls };
+        while self.follow(moment, &mut leg, settings, &mut picture, stack, probe)
+            || picture.take_up(&mut leg)
+        {}
+        (finite(picture.radiance), picture.first.surface(&ray))
     }
 
-    /// Σ E cosθ V / π over the lights, and which of them reach the point.
+    /// Adds what a ray sees, and brings it to where it goes on; returns false if it does not.
+    #[inline(always)]
+    fn follow(
+        &self,
+        moment: &Moment,
+        leg: &mut Leg,
+        settings: &Settings,
+        picture: &mut Picture,
+        stack: &mut Stack,
+        probe: &mut impl Probe,
+    ) -> bool {
+        let (ray, depth) = (leg.ray, leg.depth);
+        probe.note(|| format!("ray {depth}: from {:.5} along {:.5}", ray.origin, ray.direction));
+        let found = match leg.culls {
+            false => self.nearest(moment, &ray, Chance::Never, stack),
+            true => self.behind_back(moment, &ray, Chance::Never, stack),
+        };
+        let Some(hit) = found else {
+            self.see_sky(leg, picture, probe);
+            return false;
+        };
+        probe.note(|| format!("  {hit:?}"));
+        let point = Point::new(self, moment, &ray, &hit, leg.cone);
+        if leg.from_camera && !leg.culls && self.is_culled(&hit, &point) {
+            probe.note(|| "  the back of what is single-sided, which the camera passes".to_owned());
+            leg.culls = true;
+            return true;
+        }
+        let material = &self.scene().materials[point.material as usize];
+        let matter = &point.matter;
+        let way_m = || hit.t * ray.direction.length();
+        let inside = leg.inside.or_else(|| point.behind(material));
+        let arriving = match inside {
+            None => leg.throughput,
+            Some(sigma) => leg.throughput * attenuation(sigma, way_m()),
+        };
+        let alpha = if leg.layers < MOST_LAYERS { matter.alpha } else { 1.0 };
+        let throughput = alpha * arriving;
+        // Of what is seen behind a veil or through glass, only this part belongs to the surface.
+        let veil = if depth == 0 { throughput } else { Vec3A::ONE };
+        if material.unlit {
+            let gives = throughput * matter.base;
+            probe.note(|| format!("  unlit, throughput {throughput:.5}: adds {gives:.6}"));
+            picture.radiance += gives;
+            picture.see(self, alpha, || point.unlit(&hit), throughput);
+            leg.throughput = (1.0 - alpha) * arriving;
+            return leg.throughput != Vec3A::ZERO && leg.go_through(&point, way_m());
+        }
+        let shares = Shares::of(&point, -ray.direction, depth < settings.max_depth);
+        probe.note(|| describe(&point, material, &shares));
+        let asked = self.direct_light(moment, &point, settings, stack, probe);
+        let emissive = matter.emissive;
+        let ambient = matter.occlusion * self.ambient(point.normal);
+        let gives = throughput * (emissive + shares.matte * (ambient + asked.all));
+        probe.note(|| format!("  ambient {ambient:.5} per albedo; emits {emissive:.5}"));
+        probe.note(|| {
+            let albedo = shares.matte;
+            format!("  albedo {albedo:.5}, throughput {throughput:.5}: adds {gives:.6}")
+        });
+        picture.radiance += gives;
+        let seen = || point.surface(&hit, veil * shares.matte, asked.unhindered, asked.lit);
+        picture.see(self, alpha, seen, throughput);
+        if depth == 0 && leg.layers == 0 && settings.surfaces {
+            picture.first.look_into_mirror(self, moment, &hit, ray.direction);
+        }
+        let mirrored = throughput * shares.mirrored;
+        if alpha < 1.0 || shares.passed != Vec3A::ZERO {
+            let behind = (1.0 - alpha) * arriving;
+            let ways = [behind, throughput * shares.passed, mirrored];
+            return picture.branch(leg, (&point, material), ways, inside, way_m());
+        }
+        leg.throughput = mirrored;
+        mirrored != Vec3A::ZERO && leg.go_back(&point, inside, way_m())
+    }
+
+    fn see_sky(&self, leg: &Leg, picture: &mut Picture, probe: &mut impl Probe) {
+        let throughput = leg.throughput;
+        let sky = self.sky(leg.ray.direction);
+        let gives = throughput * sky;
+        probe.note(|| {
+            format!("  nothing hit: sky {sky:.5}, throughput {throughput:.5}: adds {gives:.6}")
+        });
+        picture.radiance += gives;
+        picture.see(self, 1.0, || sky_surface(&leg.ray), throughput);
+    }
+
+    /// Σ E cosθ V / π over the lights.
+    #[inline]
     fn direct_light(
         &self,
         moment: &Moment,
@@ -97,80 +193,130 @@ impl World {
         settings: &Settings,
         stack: &mut Stack,
         probe: &mut impl Probe,
-    ) -> (Vec3A, u32) {
-        let mut sum = Vec3A::ZERO;
-        let take = |arriving: Arriving| sum += arriving.per_albedo();
-        let lit = self.ask_lights(moment, point, settings, stack, probe, take);
-        (sum, lit)
+    ) -> Asked {
+        self.ask_lights(moment, point, settings, stack, probe, |_| ())
+    }
+}
+
+impl Picture {
+    /// Told of every surface. A veil of which less than half is there leaves the sample to what is behind.
+    #[inline(always)]
+    fn see(&mut self, world: &World, alpha: f32, seen: impl FnOnce() -> Surface, part: Vec3A) {
+        if alpha >= 0.5 {
+            self.first.see(world, seen, part);
+        }
     }
 
-    /// Hands what reaches the point to `take`, and says of which lights (see [`Surface::lit`]; the first 32).
-    #[inline(always)]
-    pub(crate) fn ask_lights(
-        &self,
-        moment: &Moment,
-        point: &Point,
-        settings: &Settings,
-        stack: &mut Stack,
-        probe: &mut impl Probe,
-        mut take: impl FnMut(Arriving),
-    ) -> u32 {
-        let mut lit = u32::MAX;
-        for (index, light) in moment.lights.iter().enumerate() {
-            let arriving = light.at(point.position.to_array());
-            let to_light = Vec3A::from(arriving.direction);
-            let irradiance = Vec3A::from(arriving.irradiance);
-            let cos = point.normal.dot(to_light);
-            let is_off = irradiance == Vec3A::ZERO;
-            if cos <= 0.0 || (is_off && !settings.surfaces) {
-                probe.note(|| format!("  light {index}: faces away or gives nothing"));
-                continue;
-            }
-            let (direction, t_max) = match light.position {
-                Some(position) => (Vec3A::from(position) - point.shadow_origin, 1.0),
-                None => (to_light, f32::INFINITY),
-            };
-            let shadow_ray = Ray { origin: point.shadow_origin, direction };
-            let is_shadowed = moment.targets(self).occluded(&shadow_ray, t_max, stack);
-            let arriving = Arriving { to_light, irradiance, cos };
-            probe.note(|| {
-                let state = if is_shadowed { "in shadow, would give" } else { "visible, gives" };
-                let contribution = arriving.per_albedo();
-                format!("  light {index}: {state} {contribution:.5} per albedo (cos {cos:.4})")
-            });
-            if !is_shadowed {
-                take(arriving);
-            } else if index < 32 {
-                lit &= !(1 << index);
+    /// Divides a way: straight on, through the surface, and back from it, with these parts of the light. The first of them that there is
+    /// is followed next, the others later.
+    #[inline(never)]
+    fn branch(
+        &mut self,
+        leg: &mut Leg,
+        (point, material): (&Point, &Material),
+        [behind, passed, mirrored]: [Vec3A; 3],
+        inside: Option<Vec3A>,
+        way_m: f32,
+    ) -> bool {
+        let with = |throughput: Vec3A, go: &dyn Fn(&mut Leg) -> bool| {
+            let mut way = Leg { throughput, ..*leg };
+            (throughput != Vec3A::ZERO && go(&mut way)).then_some(way)
+        };
+        let behind = with(behind, &|leg| leg.go_through(point, way_m));
+        let passed = with(passed, &|leg| leg.go_in(point, material, way_m));
+        let mirrored = with(mirrored, &|leg| leg.go_back(point, inside, way_m));
+        let mut legs = [behind, passed, mirrored].into_iter().flatten();
+        let Some(next) = legs.next() else { return false };
+        for later in legs {
+            let is_seen = later.throughput.max_element() >= LEAST_SHOWN;
+            if is_seen && self.branches < MOST_BRANCHES {
+                self.branches += 1;
+                self.waiting.push(later);
             }
         }
-        lit
+        *leg = next;
+        true
     }
 
-    /// Mixed between straight down and straight up by the direction's height.
-    pub(crate) fn sky(&self, direction: Vec3A) -> Vec3A {
-        let [down, up] = self.scene().sky.map(Vec3A::from);
-        let height = direction.normalize_or_zero().y;
-        down.lerp(up, 0.5 + 0.5 * height)
-    }
-}
-
-/// Light that reaches a point.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Arriving {
-    /// Unit length, world coordinates.
-    pub(crate) to_light: Vec3A,
-    /// Of a surface that faces the light.
-    pub(crate) irradiance: Vec3A,
-    /// To the shading normal; positive.
-    cos: f32,
-}
-
-impl Arriving {
-    /// What a matte surface sends back of it, per albedo.
+    /// Whether there is another way to be followed, which is then `leg`.
     #[inline(always)]
-    pub(crate) fn per_albedo(&self) -> Vec3A {
-        self.irradiance * (self.cos * FRAC_1_PI)
+    fn take_up(&mut self, leg: &mut Leg) -> bool {
+        match self.waiting.pop() {
+            None => false,
+            Some(waiting) => {
+                *leg = waiting;
+                true
+            }
+        }
+    }
+}
+
+impl Leg {
+    /// Straight on, behind a surface that blends.
+    fn go_through(&mut self, point: &Point, way_m: f32) -> bool {
+        self.ray.origin = point.inside();
+        self.cone = self.cone.after(way_m);
+        self.layers += 1;
+        self.culls = false;
+        true
+    }
+
+    /// Into the surface, or out of it; false where all is reflected.
+    fn go_in(&mut self, point: &Point, material: &Material, way_m: f32) -> bool {
+        let Some(layers) = &point.matter.layers else { return false };
+        let to_eye = -self.ray.direction.normalize_or_zero();
+        let mut direction = -to_eye;
+        if layers.refracts {
+            let eta = if point.is_front { 1.0 / layers.ior } else { layers.ior };
+            let Some(bent) = refracted(to_eye, point.normal, eta) else { return false };
+            // A shading normal may lead out again.
+            if bent.dot(point.geometric_normal) < 0.0 {
+                direction = bent;
+            }
+        }
+        self.inside = point.beyond(material, self.inside);
+        self.ray = Ray { origin: point.inside(), direction };
+        self.cone = self.cone.after(way_m);
+        self.depth += 1;
+        (self.from_camera, self.culls) = (false, false);
+        true
+    }
+
+    /// Mirrored.
+    #[inline(always)]
+    fn go_back(&mut self, point: &Point, inside: Option<Vec3A>, way_m: f32) -> bool {
+        self.ray = Ray { origin: point.outside, direction: reflect(self.ray.direction, point) };
+        self.cone = self.cone.after(way_m);
+        self.depth += 1;
+        self.inside = inside;
+        (self.from_camera, self.culls) = (false, false);
+        true
+    }
+}
+
+impl Point {
+    /// Absorption per metre of what a ray comes out of that meets the surface from behind.
+    #[inline(always)]
+    pub(crate) fn behind(&self, material: &Material) -> Option<Vec3A> {
+        if self.is_front || self.matter.layers.is_none() {
+            return None;
+        }
+        let layers = material.layers.as_ref()?;
+        let volume = layers.volume.filter(|_| layers.transmission > 0.0)?;
+        Some(volume.absorption_per_m.into())
+    }
+
+    /// The same of what a ray is in that has passed the surface and was in `inside` before.
+    pub(crate) fn beyond(&self, material: &Material, inside: Option<Vec3A>) -> Option<Vec3A> {
+        match material.layers.as_ref().and_then(|layers| layers.volume) {
+            None => inside,
+            Some(volume) => self.is_front.then_some(volume.absorption_per_m.into()),
+        }
+    }
+
+    /// What a sample says of a point of constant colour.
+    pub(crate) fn unlit(&self, hit: &Hit) -> Surface {
+        self.surface(hit, Vec3A::ZERO, Vec3A::ZERO, u32::MAX)
     }
 }
 
@@ -186,13 +332,6 @@ pub(crate) fn sky_surface(ray: &Ray) -> Surface {
     }
 }
 
-/// How much of a surface is a mirror: metallic · (1 − smoothstep(roughness from 0.1 to 0.5)). Up to 0.1 a highlight is
-/// narrower than a degree or two and a mirror tells it well; from 0.5 on a matte surface is the nearer picture.
-fn mirror_weight(material: &Material) -> f32 {
-    let x = ((material.roughness - 0.1) / (0.5 - 0.1)).clamp(0.0, 1.0);
-    material.metallic * (1.0 - x * x * (3.0 - 2.0 * x))
-}
-
 /// r = d − 2(d·n)n; where that would go into the surface, about the triangle's own normal.
 fn reflect(direction: Vec3A, point: &Point) -> Vec3A {
     let about = |normal: Vec3A| direction - 2.0 * direction.dot(normal) * normal;
@@ -204,27 +343,39 @@ fn reflect(direction: Vec3A, point: &Point) -> Vec3A {
     }
 }
 
-/// Radiance as promised: what is not a number becomes black, what is beyond all numbers the largest.
+/// Radiance as promised: what is not a number becomes black, what is beyond all reason so bright that sums of it are still numbers.
 pub(crate) fn finite(radiance: Vec3A) -> [f32; 3] {
-    radiance.to_array().map(|c| if c.is_nan() { 0.0 } else { c.clamp(0.0, f32::MAX) })
+    const BRIGHTEST: f32 = 1e30;
+    radiance.to_array().map(|c| if c.is_nan() { 0.0 } else { c.clamp(0.0, BRIGHTEST) })
 }
 
-/// Whether the material reflects and does nothing else.
+/// Whether the material reflects and does nothing else, wherever on it.
 pub(crate) fn is_pure_mirror(material: &Material) -> bool {
-    mirror_weight(material) == 1.0 && material.emissive == Vec3::ZERO
+    mirror_weight(material.metallic, material.roughness) == 1.0
+        && material.metallic_roughness_texture.is_none()
+        && material.normal_texture.is_none()
+        && material.emissive == Vec3::ZERO
+        && material.alpha_mode == AlphaMode::Opaque
+        && !material.unlit
+        && material.layers.is_none()
 }
 
-fn describe(point: &Point, material: &Material, mirror: f32) -> String {
+fn describe(point: &Point, material: &Material, shares: &Shares) -> String {
+    let matter = &point.matter;
     format!(
-        "  at {:.5} (in the object {:.5}), normal {:.5}\n  material {} \"{}\", uv {:.4?}, base colour {:.5}, mirror weight {mirror:.3}, \
-         emissive {:.5}",
+        "  at {:.5} (in the object {:.5}), normal {:.5}\n  material {} \"{}\", base colour {:.5}, alpha {:.3}, metallic {:.3}, \
+         roughness {:.3}: mirrored {:.3}, passed {:.3}, emissive {:.5}",
         point.position,
         point.local_position,
         point.normal,
         point.material,
         material.name,
-        point.uv,
-        point.base,
-        material.emissive,
+        matter.base,
+        matter.alpha,
+        matter.metallic,
+        matter.roughness,
+        shares.mirrored,
+        shares.passed,
+        matter.emissive,
     )
 }

@@ -1,17 +1,19 @@
 //! Triangles that shine, as light sources: one of them is drawn, and a point on it.
 //!
 //! ```text
-//! p(triangle) ∝ area in the object · luminance          p(ω) = p(triangle) / area in the world · r² / cosθ'
+//! p(triangle) ∝ area in the object · mean luminance          p(ω) = p(triangle) / area in the world · r² / cosθ'
 //! ```
 //!
-//! The shares are made once: where instances are scaled they are not the best ones, but always right. Spheres, and what deforms,
-//! are met by chance only.
+//! The shares are made once, with the mean of a texture wherever on it a triangle lies: where instances are scaled they are not the best
+//! ones, but always right. Spheres, and what deforms, are met by chance only.
 
 use frameless_scene::{Geometry, Scene};
 use glam::{Vec3, Vec3A};
 
 use crate::build::corners;
 use crate::moment::Moment;
+use crate::patch::Patch;
+use crate::texture::Encoding;
 use crate::world::World;
 
 /// All shining triangles of a scene.
@@ -30,7 +32,6 @@ pub(crate) struct Emitters {
 struct Emitter {
     instance: u32,
     primitive: u32,
-    radiance: Vec3A,
 }
 
 /// Light from a point on a triangle.
@@ -47,6 +48,7 @@ pub(crate) struct FromEmitter {
 impl Emitters {
     /// Finds them.
     pub(crate) fn new(scene: &Scene) -> Emitters {
+        let means: Vec<Vec3> = scene.materials.iter().map(|m| scene.mean_radiance(m)).collect();
         let (mut triangles, mut weights) = (Vec::new(), Vec::new());
         let (mut first_of, mut share_of) = (Vec::new(), Vec::new());
         for (instance, placed) in scene.instances.iter().enumerate() {
@@ -59,8 +61,7 @@ impl Emitters {
             }
             let radiance = |primitive: usize| {
                 let material = mesh.triangle_materials.get(primitive);
-                let material = material.and_then(|&index| scene.materials.get(index as usize));
-                material.map_or(Vec3::ZERO, |material| material.emissive)
+                material.and_then(|&m| means.get(m as usize)).copied().unwrap_or(Vec3::ZERO)
             };
             if (0..mesh.triangles.len()).all(|primitive| radiance(primitive) == Vec3::ZERO) {
                 continue;
@@ -72,7 +73,7 @@ impl Emitters {
                 share_of.push(weight);
                 if weight > 0.0 && weight.is_finite() {
                     let (instance, primitive) = (instance as u32, primitive as u32);
-                    triangles.push(Emitter { instance, primitive, radiance: radiance.into() });
+                    triangles.push(Emitter { instance, primitive });
                     weights.push(f64::from(weight));
                 }
             }
@@ -104,11 +105,14 @@ impl Emitters {
     ) -> Option<FromEmitter> {
         let index = self.up_to.partition_point(|&up_to| up_to <= pick);
         let emitter = *self.triangles.get(index)?;
-        let [a, b, c] = in_world(world, moment, emitter.instance, emitter.primitive)?;
+        let Emitter { instance, primitive } = emitter;
+        let [a, b, c] = in_world(world, moment, instance, primitive)?;
         let root = u.sqrt();
-        let to_light = a + root * ((1.0 - v) * (b - a) + v * (c - a)) - from;
-        let density = self.density(emitter.instance, emitter.primitive, [a, b, c], to_light);
-        let light = FromEmitter { to_light, radiance: emitter.radiance, density };
+        let weights = [1.0 - root, root * (1.0 - v), root * v];
+        let to_light = a + weights[1] * (b - a) + weights[2] * (c - a) - from;
+        let density = self.density(instance, primitive, [a, b, c], to_light);
+        let radiance = radiance(world, instance, primitive, weights);
+        let light = FromEmitter { to_light, radiance, density };
         (density > 0.0 && density.is_finite()).then_some(light)
     }
 
@@ -136,6 +140,19 @@ impl Emitters {
         let r = to.length();
         share * 2.0 * r * r * r / to.dot(twice_area).abs()
     }
+}
+
+/// What a point of a mesh's triangle gives off.
+fn radiance(world: &World, instance: u32, primitive: u32, weights: [f32; 3]) -> Vec3A {
+    let scene = world.scene();
+    let geometry = scene.instances[instance as usize].geometry;
+    let Geometry::Mesh(mesh) = &scene.geometries[geometry as usize] else { return Vec3A::ZERO };
+    let material = &scene.materials[mesh.triangle_materials[primitive as usize] as usize];
+    let Some(reference) = &material.emissive_texture else { return material.emissive.into() };
+    let vertices = mesh.triangles[primitive as usize].map(|vertex| vertex as usize);
+    let patch = Patch::Triangle { mesh, vertices, weights, footprint: 0.0 };
+    let texel = patch.look_up(world, reference, Encoding::Color);
+    Vec3A::from(material.emissive) * Vec3A::from_vec4(texel)
 }
 
 /// A triangle's corners now, if its instance is a mesh; as it was modelled, should the mesh deform: such are not asked.

@@ -31,7 +31,8 @@ pub fn explain(
         "pixel ({x}, {y}) of {}×{}, offset {:?}, at {secs} s",
         size.width, size.height, request.offset
     )];
-    let ray = Camera::new(&view, size).ray(request);
+    let camera = Camera::new(&view, size);
+    let ray = (camera.ray(request), camera.cone());
     let (rgb, surface) = world.radiance(&moment, ray, settings, &mut Stack::new(), &mut lines);
     lines.push(format!("first surface: {surface:?}"));
     let [r, g, b, _] = Display::new(0.0).encode_rgba8(rgb);

@@ -82,10 +82,10 @@ impl World {
         settings: &Settings,
         stack: &mut Stack,
     ) -> ([f32; 3], Surface) {
-        let ray = camera.ray(request);
+        let (ray, cone) = (camera.ray(request), camera.cone());
         match settings.integrator {
-            Integrator::Direct => self.radiance(moment, ray, settings, stack, &mut NoProbe),
-            Integrator::Path => self.path_radiance(moment, ray, request, settings, stack),
+            Integrator::Direct => self.radiance(moment, (ray, cone), settings, stack, &mut NoProbe),
+            Integrator::Path => self.path_radiance(moment, (ray, cone), request, settings, stack),
         }
     }
 }

@@ -5,6 +5,7 @@
 //! and shades what it hits with one of the two integrators, deterministic or by random paths. [`CpuTracer`] does so for whole batches beside the
 //! loop, [`render`] for whole pictures, [`explain`] for one pixel in words.
 
+mod asking;
 mod bsdf;
 mod build;
 mod camera;
@@ -14,19 +15,28 @@ mod direct;
 mod emitters;
 mod explain;
 mod first;
+mod fresnel;
+mod holes;
 mod images;
 mod integrator;
 mod kernel;
 mod lights;
+mod matter;
 mod moment;
 mod order;
+mod patch;
 mod path;
 mod planes;
 mod point;
 mod ray;
 mod refit;
 mod render;
+mod shares;
+mod sheen;
+mod sift;
 mod sphere;
+mod surroundings;
+mod tangent;
 mod texture;
 mod top;
 mod traverse;
@@ -41,6 +51,8 @@ mod light_transport;
 mod reference;
 #[cfg(test)]
 mod shading;
+#[cfg(test)]
+mod surfaces;
 #[cfg(test)]
 mod test_scenes;
 

@@ -46,6 +46,7 @@ fn in_a_closed_glowing_room_every_bounce_adds_its_part() {
     let mut scene = scenes::empty();
     let albedo = Vec3::new(0.5, 0.8, 0.0);
     let walls = matte(&mut scene, albedo, Vec3::splat(0.3));
+    scene.materials[walls as usize].double_sided = true;
     let room = Transform { scale: Vec3::new(3.0, 1.0, 2.0), ..Transform::IDENTITY };
     scenes::add(&mut scene, scenes::triangle_sphere(8, 12, walls), room);
     let got = looking(scene, Vec3::ZERO, Vec3::new(1.0, 0.2, 0.3), 1 << 14);

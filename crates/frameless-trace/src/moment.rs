@@ -152,7 +152,9 @@ impl World {
             let world_from_object = self.scene().world_from_instance(index, &moment.state);
             match moment.placed.get_mut(index) {
                 Some(placed) if placed.world_from_object == world_from_object => continue,
-                Some(placed) => *placed = Placed::new(world_from_object, placed.shape),
+                Some(placed) => {
+                    *placed = Placed::new(world_from_object, placed.shape, placed.has_holes);
+                }
                 None => {
                     let deformation = self.scene().deformation_of(index);
                     let shape = match (&geometries[instance.geometry as usize], deformation) {
@@ -162,7 +164,8 @@ impl World {
                         (Geometry::Mesh(_), None) => Shape::Mesh(instance.geometry),
                         (Geometry::Sphere { .. }, _) => Shape::Sphere,
                     };
-                    moment.placed.push(Placed::new(world_from_object, shape));
+                    let has_holes = self.holes[instance.geometry as usize];
+                    moment.placed.push(Placed::new(world_from_object, shape, has_holes));
                 }
             }
             moved = true;

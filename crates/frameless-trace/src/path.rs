@@ -6,11 +6,14 @@
 //! ```
 //!
 //! Unidirectional paths: at every surface point all punctual lights are asked, and one point of what shines ([`Emitters`]); then one
-//! direction is followed ([`Bsdf::sample`]), to the next surface or the sky. What shines is found in both ways, each weighted by how
-//! likely it was to find it (Veach and Guibas 1995, "Optimally Combining Sampling Techniques for Monte Carlo Rendering"). So on until the path is ended by Russian roulette or has met
+//! direction is followed ([`Bsdf::sample`]), to the next surface or the sky. What shines is found in both ways, and so is an environment
+//! ([`Surroundings`]), each weighted by how likely it was to find it (Veach and Guibas 1995, "Optimally Combining Sampling Techniques for Monte Carlo Rendering"). So on until the path is ended by Russian roulette or has met
 //! [`Settings::max_depth`] surfaces after the first. The scene's ambient light stands for what is computed here, and is left out.
 //!
-//! Unbiased but for that limit. Random numbers are Owen-scrambled Sobol points (Burley 2020, "Practical Hash-based Owen
+//! Unbiased but for that limit, and for punctual lights behind glass, which are seen straight through it. Lamps and the environment are not:
+//! they are met through it. Surfaces that blend are there with their alpha as probability. What encloses a volume absorbs e^(−σ·way).
+//!
+//! Random numbers are Owen-scrambled Sobol points (Burley 2020, "Practical Hash-based Owen
 //! Scrambling") by the request's number in its pixel's sequence: the same request has the same answer.
 
 use frameless::{Request, Surface};
@@ -22,10 +25,14 @@ use crate::direct::{NoProbe, finite, sky_surface};
 #[cfg(doc)]
 use crate::emitters::Emitters;
 use crate::first::FirstSurface;
+use crate::holes::{Chance, attenuation};
 use crate::integrator::Settings;
 use crate::moment::Moment;
 use crate::point::Point;
 use crate::ray::Ray;
+#[cfg(doc)]
+use crate::surroundings::Surroundings;
+use crate::texture::Cone;
 use crate::traverse::Stack;
 use crate::world::World;
 
@@ -41,7 +48,7 @@ impl World {
     pub(crate) fn path_radiance(
         &self,
         moment: &Moment,
-        mut ray: Ray,
+        (mut ray, mut cone): (Ray, Cone),
         request: &Request,
         settings: &Settings,
         stack: &mut Stack,
@@ -51,17 +58,40 @@ impl World {
         let mut first = FirstSurface::default();
         // Of the direction that the path took last; `None` where no other would have done.
         let mut density = None;
+        // Absorption per metre of what the path is inside, if that is known.
+        let mut inside = None;
         for depth in 0..=settings.max_depth {
-            let Some(hit) = moment.targets(self).closest(&ray, stack) else {
-                radiance += throughput * self.sky(ray.direction);
+            let chance = numbers.chance(depth);
+            let hit = self.nearest(moment, &ray, chance, stack);
+            let mut met = hit.map(|hit| (hit, Point::new(self, moment, &ray, &hit, cone)));
+            if depth == 0
+                && let Some((hit, point)) = &met
+                && self.is_culled(hit, point)
+            {
+                let behind = self.behind_back(moment, &ray, chance, stack);
+                met = behind.map(|hit| (hit, Point::new(self, moment, &ray, &hit, cone)));
+            }
+            let Some((hit, point)) = met else {
+                radiance += throughput * self.sky_seen(ray.direction, density);
                 first.see(self, || sky_surface(&ray), throughput);
                 break;
             };
-            let point = Point::new(self, moment, &ray, &hit);
             let material = &self.scene().materials[point.material as usize];
-            let to_eye = -ray.direction.normalize_or_zero();
-            let bsdf = Bsdf::new(material, point.base, point.normal, to_eye);
-            let emissive = Vec3A::from(material.emissive);
+            let way_m = hit.t * ray.direction.length();
+            inside = inside.or_else(|| point.behind(material));
+            if let Some(sigma) = inside {
+                throughput *= attenuation(sigma, way_m);
+            }
+            if material.unlit {
+                // Shown, but no light for others.
+                if density.is_none() {
+                    radiance += throughput * point.matter.base;
+                }
+                first.see(self, || point.unlit(&hit), throughput);
+                break;
+            }
+            let bsdf = Bsdf::new(&point, -ray.direction.normalize_or_zero());
+            let emissive = point.matter.emissive;
             if emissive != Vec3A::ZERO {
                 let place = [hit.instance, hit.primitive];
                 let to_light = hit.t * ray.direction;
@@ -69,21 +99,23 @@ impl World {
                 radiance += density.map_or(1.0, |own| weight(own, other())) * throughput * emissive;
             }
             let numbers = numbers.at(depth);
-            let (mut scattered, mut irradiance) = (Vec3A::ZERO, Vec3A::ZERO);
-            let lit = self.ask_lights(moment, &point, settings, stack, &mut NoProbe, |arriving| {
-                scattered += bsdf.scattered(arriving.to_light) * arriving.irradiance;
-                irradiance += arriving.per_albedo();
-            });
+            let mut scattered = Vec3A::ZERO;
+            let asked =
+                self.ask_lights(moment, &point, settings, stack, &mut NoProbe, |arriving| {
+                    scattered += bsdf.scattered(arriving.to_light) * arriving.irradiance;
+                });
             scattered += self.ask_emitters(moment, &point, &bsdf, numbers.light, stack);
+            scattered += self.ask_surroundings(moment, &point, &bsdf, numbers.sky, stack);
             radiance += throughput * scattered;
             let albedo = bsdf.albedo();
-            first.see(self, || point.surface(&hit, albedo, irradiance, lit), throughput);
+            let seen = || point.surface(&hit, albedo, asked.unhindered, asked.lit);
+            first.see(self, seen, throughput);
             if depth == 0 && settings.surfaces && bsdf.is_mirror() {
                 first.look_into_mirror(self, moment, &hit, ray.direction);
             }
             let Some(next) = bsdf.sample(numbers.direction) else { break };
-            // A shading normal may lead below the surface itself.
-            if next.direction.dot(point.geometric_normal) <= 0.0 {
+            // A shading normal may lead to the wrong side of the surface itself.
+            if (next.direction.dot(point.geometric_normal) <= 0.0) != next.passes {
                 break;
             }
             throughput *= next.weight;
@@ -95,9 +127,46 @@ impl World {
                 throughput /= goes_on;
             }
             density = next.density;
-            ray = Ray { origin: point.outside, direction: next.direction };
+            cone = cone.after(way_m).scattered(next.alpha);
+            if next.passes {
+                inside = point.beyond(material, inside);
+            }
+            let origin = if next.passes { point.inside() } else { point.outside };
+            ray = Ray { origin, direction: next.direction };
         }
         (finite(radiance), first.surface(&ray))
+    }
+
+    /// What comes from far away, weighed by how else it would have been found than by the path's last direction.
+    fn sky_seen(&self, direction: Vec3A, density: Option<f32>) -> Vec3A {
+        let sky = self.sky(direction);
+        match (&self.surroundings, density) {
+            (Some(surroundings), Some(own)) => {
+                weight(own, surroundings.density(direction.normalize_or_zero())) * sky
+            }
+            _ => sky,
+        }
+    }
+
+    /// What reaches the eye from one direction of the environment.
+    fn ask_surroundings(
+        &self,
+        moment: &Moment,
+        point: &Point,
+        bsdf: &Bsdf,
+        numbers: [f32; 2],
+        stack: &mut Stack,
+    ) -> Vec3A {
+        let light = self.surroundings.as_ref().and_then(|all| all.sample(numbers));
+        let Some(light) = light else { return Vec3A::ZERO };
+        let scattered = bsdf.scattered(light.direction);
+        if scattered == Vec3A::ZERO || light.direction.dot(point.geometric_normal) <= 0.0 {
+            return Vec3A::ZERO;
+        }
+        let shadow_ray = Ray { origin: point.shadow_origin, direction: light.direction };
+        let passes = self.passing(moment, &shadow_ray, f32::INFINITY, false, stack);
+        let weight = weight(light.density, bsdf.density(light.direction));
+        passes * scattered * light.radiance * (weight / light.density)
     }
 
     /// What reaches the eye of one point of what shines.
@@ -118,11 +187,9 @@ impl World {
             return Vec3A::ZERO;
         }
         let shadow_ray = Ray { origin: point.shadow_origin, direction: light.to_light };
-        if moment.targets(self).occluded(&shadow_ray, NEARLY_THERE, stack) {
-            return Vec3A::ZERO;
-        }
+        let passes = self.passing(moment, &shadow_ray, NEARLY_THERE, false, stack);
         let weight = weight(light.density, bsdf.density(direction));
-        scattered * light.radiance * (weight / light.density)
+        passes * scattered * light.radiance * (weight / light.density)
     }
 }
 
@@ -142,6 +209,7 @@ struct Numbers {
 struct AtSurface {
     direction: [f32; 3],
     light: [f32; 3],
+    sky: [f32; 2],
     roulette: f32,
 }
 
@@ -154,16 +222,22 @@ impl Numbers {
 
     /// For the surface that a path meets after `depth` others.
     fn at(&self, depth: u32) -> AtSurface {
-        const TURN: u32 = NUM_DIMENSION_SETS_4D / 2;
-        let (set, turn) = (2 * (depth % TURN), depth / TURN);
+        const TURN: u32 = NUM_DIMENSION_SETS_4D / 3;
+        let (set, turn) = (3 * (depth % TURN), depth / TURN);
         let four = |set| sample_4d(self.index, set, mixed(self.seed ^ turn));
-        let ([choice, u, v, roulette], [pick, s, t, _]) = (four(set), four(set + 1));
-        AtSurface { direction: [choice, u, v], light: [pick, s, t], roulette }
+        let ([choice, u, v, roulette], [pick, s, t, a]) = (four(set), four(set + 1));
+        let [b, ..] = four(set + 2);
+        AtSurface { direction: [choice, u, v], light: [pick, s, t], sky: [a, b], roulette }
+    }
+
+    /// For the ray that goes there: whether what blends is there.
+    fn chance(&self, depth: u32) -> Chance {
+        Chance::By(mixed(self.seed ^ mixed(self.index ^ (depth << 16))))
     }
 }
 
 /// Every bit of the result depends on every bit of the number ("lowbias32", Wellons 2018).
-fn mixed(mut x: u32) -> u32 {
+pub(crate) fn mixed(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x7feb_352d);
     x ^= x >> 15;

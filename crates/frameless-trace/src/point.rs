@@ -1,18 +1,21 @@
 //! The point that a ray hit: where it is, which way it faces, what it is made of.
 
 use frameless::Surface;
-use frameless_scene::{Deformed, Geometry, Material, Mesh};
-use glam::{Vec2, Vec3A, Vec4};
+use frameless_scene::{Deformed, Geometry, Mesh};
+use glam::{Vec3A, Vec4};
 
+use crate::matter::Matter;
 use crate::moment::Moment;
+use crate::patch::Patch;
 use crate::ray::{Hit, Ray};
 use crate::sphere;
-use crate::texture;
+use crate::tangent::{self, Triangle};
+use crate::texture::Cone;
 use crate::top::Placed;
 use crate::world::World;
 
 /// A point on a surface, seen from one side: both normals are on the side of the ray.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Point {
     /// World coordinates.
     pub(crate) position: Vec3A,
@@ -24,6 +27,8 @@ pub(crate) struct Point {
     pub(crate) geometric_normal: Vec3A,
     /// Unit normal for shading, world coordinates; within 90° of the geometric one.
     pub(crate) normal: Vec3A,
+    /// Whether the front is seen.
+    pub(crate) is_front: bool,
     /// Hit point in the object's coordinates.
     pub(crate) local_position: Vec3A,
     /// What finds the point again, see [`frameless::Surface::position`]: barycentric weights if the object deforms, else
@@ -31,16 +36,14 @@ pub(crate) struct Point {
     pub(crate) anchor: Vec3A,
     /// Unit shading normal in the object's coordinates.
     pub(crate) local_normal: Vec3A,
-    /// Texture coordinates, where the material has a texture.
-    pub(crate) uv: [f32; 2],
-    /// Linear RGB base colour: factor · texture · vertex colour.
-    pub(crate) base: Vec3A,
+    /// What the material says here.
+    pub(crate) matter: Matter,
     /// Index into the scene's materials.
     pub(crate) material: u32,
 }
 
 /// A point before the object's transform. Normals on the ray's side, of any length; may be zero.
-struct Local {
+struct Local<'a> {
     position: Vec3A,
     anchor: Vec3A,
     shadow_origin: Vec3A,
@@ -48,12 +51,22 @@ struct Local {
     normal: Vec3A,
     /// No coordinate that went into `position` is larger; rounding errors are in proportion to it.
     extent: Vec3A,
-    uv: [f32; 2],
-    color: Vec3A,
+    /// Where textures are looked up; its footprint is not known yet.
+    patch: Patch<'a>,
+    triangle: Option<Triangle>,
+    is_front: bool,
+    /// Linear RGBA of the vertices.
+    color: Vec4,
     material: u32,
 }
 
 impl Point {
+    /// Where rays begin that go through the surface: as far on its other side as [`Point::outside`] is on this.
+    #[inline(always)]
+    pub(crate) fn inside(&self) -> Vec3A {
+        2.0 * self.position - self.outside
+    }
+
     /// What a sample says of the point; `per_albedo`: the direct light that a white surface would send back.
     pub(crate) fn surface(&self, hit: &Hit, albedo: Vec3A, per_albedo: Vec3A, lit: u32) -> Surface {
         Surface {
@@ -67,29 +80,122 @@ impl Point {
         }
     }
 
-    #[inline]
-    pub(crate) fn new(world: &World, moment: &Moment, ray: &Ray, hit: &Hit) -> Point {
-        let scene = world.scene();
-        let geometry = scene.instances[hit.instance as usize].geometry;
+    /// Where `ray` has met something. `cone`: how wide it is where it begins.
+    #[inline(always)]
+    pub(crate) fn new(world: &World, moment: &Moment, ray: &Ray, hit: &Hit, cone: Cone) -> Point {
         let placed = moment.placed(hit.instance);
-        let local_ray = ray.transformed(&placed.object_from_world);
-        let local = match &scene.geometries[geometry as usize] {
-            Geometry::Mesh(mesh) => {
-                let materials = &scene.materials;
-                match moment.deforming(placed) {
-                    None => on_mesh(mesh, &Rigid(mesh), materials, &local_ray, hit),
-                    Some(deforming) => {
-                        let local = on_mesh(mesh, deforming.now(), materials, &local_ray, hit);
-                        Local { anchor: weights(hit).into(), ..local }
-                    }
+        let mut local = local(world, moment, placed, ray, hit);
+        let number = local.material as usize;
+        let material = &world.scene().materials[number];
+        if world.is_plain[number] {
+            let matter = Matter::plain(world, material, &local.patch, local.color);
+            return into_world(ray, placed, &local, matter);
+        }
+        Point::elaborate(world, placed, (ray, hit, cone), &mut local)
+    }
+
+    /// The same for all materials, out of the way of those that are plain.
+    #[inline(never)]
+    fn elaborate(
+        world: &World,
+        placed: &Placed,
+        (ray, hit, cone): (&Ray, &Hit, Cone),
+        local: &mut Local<'_>,
+    ) -> Point {
+        let material = &world.scene().materials[local.material as usize];
+        let way_m = hit.t * ray.direction.length();
+        local.take_footprint(placed, cone.after(way_m).width_m, ray.direction);
+        let matter = Matter::new(world, material, &local.patch, local.color);
+        let mut point = into_world(ray, placed, local, matter);
+        let coat = material.layers.as_ref().and_then(|layers| layers.clearcoat_normal_texture);
+        let coat_normal = coat.map_or(point.normal, |map| bend(world, map, placed, local, &point));
+        if let Some(layers) = &mut point.matter.layers {
+            layers.coat_normal = coat_normal;
+        }
+        if let Some(map) = material.normal_texture {
+            let normal = bend(world, map, placed, local, &point);
+            let of_object = placed.world_from_object.matrix3.transpose() * normal;
+            point.normal = normal;
+            point.local_normal = of_object.try_normalize().unwrap_or(point.local_normal);
+        }
+        point
+    }
+}
+
+/// What a hit needs to be known of to tell whether it is one: less than a [`Point`].
+pub(crate) struct Placement<'a> {
+    pub(crate) patch: Patch<'a>,
+    /// Linear RGBA of the vertices.
+    pub(crate) color: Vec4,
+    pub(crate) is_front: bool,
+    /// Of the angle to the triangle's normal.
+    pub(crate) cosine: f32,
+}
+
+impl<'a> Placement<'a> {
+    pub(crate) fn new(world: &'a World, moment: &Moment, ray: &Ray, hit: &Hit) -> Placement<'a> {
+        let placed = moment.placed(hit.instance);
+        let local = local(world, moment, placed, ray, hit);
+        let normal = placed.object_from_world.matrix3.transpose() * local.geometric_normal;
+        let cosine = -normal.normalize_or_zero().dot(ray.direction.normalize_or_zero());
+        let Local { patch, color, is_front, .. } = local;
+        Placement { patch, color, is_front, cosine }
+    }
+}
+
+/// A point's normal, bent by a map.
+fn bend(
+    world: &World,
+    map: (frameless_scene::TextureRef, f32),
+    placed: &Placed,
+    local: &Local<'_>,
+    point: &Point,
+) -> Vec3A {
+    let Some(triangle) = &local.triangle else { return point.normal };
+    let bent = tangent::bent(world, map, (&local.patch, triangle), placed, point.normal);
+    tangent::above(bent, point.geometric_normal)
+}
+
+#[inline(always)]
+fn local<'a>(
+    world: &'a World,
+    moment: &Moment,
+    placed: &Placed,
+    ray: &Ray,
+    hit: &Hit,
+) -> Local<'a> {
+    let scene = world.scene();
+    let geometry = scene.instances[hit.instance as usize].geometry;
+    let local_ray = ray.transformed(&placed.object_from_world);
+    match &scene.geometries[geometry as usize] {
+        Geometry::Mesh(mesh) => match moment.deforming(placed) {
+            None => on_mesh(mesh, &Rigid(mesh), &local_ray, hit),
+            Some(deforming) => {
+                let mut local = on_mesh(mesh, deforming.now(), &local_ray, hit);
+                local.anchor = weights(hit).into();
+                if let Some(triangle) = &mut local.triangle {
+                    triangle.deforms = true;
                 }
+                local
             }
-            Geometry::Sphere { material } => on_sphere(*material, &local_ray, hit.t),
+        },
+        Geometry::Sphere { material } => on_sphere(*material, &local_ray, hit.t),
+    }
+}
+
+impl Local<'_> {
+    /// `width_m`: of the cone where it hits; `direction`: of the ray in the world.
+    fn take_footprint(&mut self, placed: &Placed, width_m: f32, direction: Vec3A) {
+        let (Some(triangle), Patch::Triangle { footprint, .. }) = (&self.triangle, &mut self.patch)
+        else {
+            return;
         };
-        let material = &scene.materials[local.material as usize];
-        let base =
-            Vec3A::from_vec4(material.base_color) * local.color * texel(world, material, local.uv);
-        into_world(ray, placed, &local, base)
+        let [a, b, c] = triangle.corners;
+        let matrix = &placed.world_from_object.matrix3;
+        let twice_area = (*matrix * (b - a)).cross(*matrix * (c - a));
+        // |n·d| A for a direction of length one.
+        let facing = twice_area.dot(direction.normalize_or_zero());
+        *footprint = width_m * width_m / facing.abs();
     }
 }
 
@@ -144,18 +250,11 @@ fn weights(hit: &Hit) -> [f32; 3] {
     [1.0 - v - w, v, w]
 }
 
-fn texel(world: &World, material: &Material, uv: [f32; 2]) -> Vec3A {
-    let Some(reference) = material.base_color_texture else { return Vec3A::ONE };
-    let scene = world.scene();
-    let texture = &scene.textures[reference.texture as usize];
-    let image = &scene.images[texture.image as usize];
-    texture::look_up(texture, image, &world.linear_from_srgb, uv)
-}
-
-fn on_sphere(material: u32, ray: &Ray, t: f32) -> Local {
+fn on_sphere<'a>(material: u32, ray: &Ray, t: f32) -> Local<'a> {
     // Back onto the sphere: t is relative to a ray that may come from far away.
     let position = (ray.origin + t * ray.direction).normalize_or_zero();
-    let normal = if position.dot(ray.direction) > 0.0 { -position } else { position };
+    let is_front = position.dot(ray.direction) <= 0.0;
+    let normal = if is_front { position } else { -position };
     Local {
         position,
         anchor: position,
@@ -163,28 +262,26 @@ fn on_sphere(material: u32, ray: &Ray, t: f32) -> Local {
         geometric_normal: normal,
         normal,
         extent: Vec3A::ONE,
-        uv: sphere::texture_coordinates(position),
-        color: Vec3A::ONE,
+        patch: Patch::Sphere { uv: sphere::texture_coordinates(position) },
+        triangle: None,
+        is_front,
+        color: Vec4::ONE,
         material,
     }
 }
 
-#[inline]
-fn on_mesh(
-    mesh: &Mesh,
-    now: &impl Vertices,
-    materials: &[Material],
-    ray: &Ray,
-    hit: &Hit,
-) -> Local {
-    let material = mesh.triangle_materials[hit.primitive as usize];
-    let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
+#[inline(always)]
+fn on_mesh<'a>(mesh: &'a Mesh, now: &impl Vertices, ray: &Ray, hit: &Hit) -> Local<'a> {
+    let index = hit.primitive as usize;
+    let material = mesh.triangle_materials[index];
+    let vertices = mesh.triangles[index].map(|vertex| vertex as usize);
     let corners = vertices.map(|vertex| now.position(vertex));
     let [a, b, c] = corners;
     let weights = weights(hit);
     let position = blend(weights, corners);
     let winding_normal = (b - a).cross(c - a);
-    let geometric_normal = facing(winding_normal, -ray.direction);
+    let is_front = winding_normal.dot(ray.direction) <= 0.0;
+    let geometric_normal = if is_front { winding_normal } else { -winding_normal };
     let (normal, shadow_origin) = match vertices.map(|vertex| now.normal(vertex)) {
         [Some(a), Some(b), Some(c)] => {
             let normals = [a, b, c].map(|normal| facing(normal, geometric_normal));
@@ -192,34 +289,30 @@ fn on_mesh(
         }
         _ => (geometric_normal, position),
     };
-    let uv = match materials[material as usize].base_color_texture {
-        Some(reference) if !mesh.uvs[reference.uv_set as usize].is_empty() => {
-            let uvs = &mesh.uvs[reference.uv_set as usize];
-            let [a, b, c] = vertices.map(|vertex| uvs[vertex]);
-            (weights[0] * a + weights[1] * b + weights[2] * c).to_array()
-        }
-        _ => Vec2::ZERO.to_array(),
-    };
-    let color = if now.colors().is_empty() {
-        Vec3A::ONE
-    } else {
-        blend(
-            weights,
-            vertices.map(|vertex| Vec3A::from_vec4(Vec4::max(now.colors()[vertex], Vec4::ZERO))),
-        )
-    };
-    let extent = a.abs().max(b.abs()).max(c.abs());
     Local {
         position,
         anchor: position,
         shadow_origin,
         geometric_normal,
         normal,
-        extent,
-        uv,
-        color,
+        extent: a.abs().max(b.abs()).max(c.abs()),
+        patch: Patch::Triangle { mesh, vertices, weights, footprint: 0.0 },
+        triangle: Some(Triangle { index, corners, is_front, deforms: false }),
+        is_front,
+        color: vertex_color(now, vertices, weights),
         material,
     }
+}
+
+/// Linear RGBA; white of a mesh without colours.
+#[inline(always)]
+fn vertex_color(now: &impl Vertices, vertices: [usize; 3], weights: [f32; 3]) -> Vec4 {
+    let colors = now.colors();
+    if colors.is_empty() {
+        return Vec4::ONE;
+    }
+    let [a, b, c] = vertices.map(|vertex| Vec4::max(colors[vertex], Vec4::ZERO));
+    weights[0] * a + weights[1] * b + weights[2] * c
 }
 
 #[inline(always)]
@@ -259,8 +352,8 @@ fn on_smooth_surface(
 /// interpolation, the way to the world and the way back with an inverted matrix; at 10 m it is 0.08 mm.
 const OFFSET: f32 = 64.0 * f32::EPSILON;
 
-#[inline]
-fn into_world(ray: &Ray, placed: &Placed, local: &Local, base: Vec3A) -> Point {
+#[inline(always)]
+fn into_world(ray: &Ray, placed: &Placed, local: &Local<'_>, matter: Matter) -> Point {
     let m = &placed.world_from_object;
     // Normals transform with the inverse's transpose.
     let normal_from_local = placed.object_from_world.matrix3.transpose();
@@ -283,11 +376,11 @@ fn into_world(ray: &Ray, placed: &Placed, local: &Local, base: Vec3A) -> Point {
         shadow_origin: m.transform_point3a(local.shadow_origin) + outwards,
         geometric_normal,
         normal,
+        is_front: local.is_front,
         local_position: local.position,
         anchor: local.anchor,
         local_normal: local_normal.try_normalize().unwrap_or(Vec3A::Y),
-        uv: local.uv,
-        base,
+        matter,
         material: local.material,
     }
 }

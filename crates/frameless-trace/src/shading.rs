@@ -74,6 +74,7 @@ fn mirrors_in_a_glowing_room_are_invisible() {
     scene.materials.push(Material {
         base_color: glam::Vec4::new(0.0, 0.0, 0.0, 1.0),
         emissive: Vec3::ONE,
+        double_sided: true,
         ..Material::default()
     });
     let room = Transform { scale: Vec3::splat(20.0), ..Transform::IDENTITY };
@@ -143,12 +144,35 @@ fn a_light_that_is_off_still_has_its_shadow_remembered() {
 }
 
 #[test]
-fn both_sides_of_a_surface_are_drawn() {
+fn both_sides_of_a_double_sided_surface_are_drawn() {
     let mut scene = matte_floor(1.0);
+    scene.materials[0].double_sided = true;
     scenes::add_point_light(&mut scene, Vec3::new(0.0, -2.0, 0.0), 4.0 * PI);
     let (rgb, surface) = looking(scene, Vec3::new(0.0, -1.0, 0.1), Vec3::ZERO);
     assert_near(rgb[0], 1.0, 1e-4);
     assert_eq!(surface.normal, [0.0, -1.0, 0.0]);
+}
+
+/// As viewers do that rasterise; but light does not pass what the camera does.
+#[test]
+fn the_camera_passes_the_back_of_a_single_sided_surface_and_light_does_not() {
+    let mut scene = matte_floor(1.0);
+    scenes::add_material(&mut scene, Vec3::ONE, 0.0, 1.0);
+    let ceiling = Transform { rotation: Quat::from_rotation_x(PI), ..scenes::at(0.0, 1.0, 0.0) };
+    scenes::add(&mut scene, scenes::floor(1.0, 0.0, 1), ceiling);
+    scenes::add_point_light(&mut scene, Vec3::new(0.0, 3.0, 0.0), 4.0 * PI);
+    // From above the ceiling's back is not there; the floor below it is, in its shadow.
+    let (rgb, surface) = looking(scene.clone(), Vec3::new(0.0, 4.0, 0.1), Vec3::ZERO);
+    assert_eq!((rgb, surface.object), ([0.0; 3], 0));
+    // Mirrored in x it has another front: that of its mirrored triangles, as glTF 2.0 §3.7.4 has it.
+    let node = scene.instances[1].node as usize;
+    scene.nodes[node].rest.scale = Vec3::new(1.0, -1.0, 1.0);
+    let (rgb, surface) = looking(scene.clone(), Vec3::new(0.0, 4.0, 0.1), Vec3::ZERO);
+    assert_eq!((rgb[0] > 0.0, surface.object), (true, 1));
+    scene.nodes[node].rest.scale = Vec3::ONE;
+    scene.materials[1].double_sided = true;
+    let (rgb, surface) = looking(scene, Vec3::new(0.0, 4.0, 0.1), Vec3::ZERO);
+    assert_eq!((rgb[0] > 0.0, surface.object), (true, 1));
 }
 
 #[test]

@@ -51,11 +51,14 @@ pub(crate) struct Placed {
     pub(crate) world_from_object: Affine3A,
     pub(crate) object_from_world: Affine3A,
     pub(crate) shape: Shape,
+    /// Whether rays may pass some of its triangles.
+    pub(crate) has_holes: bool,
 }
 
 impl Placed {
-    pub(crate) fn new(world_from_object: Affine3A, shape: Shape) -> Placed {
-        Placed { world_from_object, object_from_world: world_from_object.inverse(), shape }
+    pub(crate) fn new(world_from_object: Affine3A, shape: Shape, has_holes: bool) -> Placed {
+        let object_from_world = world_from_object.inverse();
+        Placed { world_from_object, object_from_world, shape, has_holes }
     }
 
     /// World box; `None` where nothing can be hit: no triangles, or a transform without an inverse (a scale of zero).
@@ -89,13 +92,13 @@ impl Placed {
 
 /// The tree over the instances, with the memory to build it again.
 pub(crate) struct Top {
-    nodes: Vec<Node>,
+    pub(crate) nodes: Vec<Node>,
     /// Of the instances that can be hit.
     boxes: Vec<Aabb>,
     /// Which instance each box is of.
     instances: Vec<u32>,
     /// The same instances in the order of the leaves.
-    leaves: Vec<u32>,
+    pub(crate) leaves: Vec<u32>,
     binary: Bvh2,
     builder: PlocBuilder,
 }
@@ -197,14 +200,16 @@ impl Targets<'_> {
         if !ray.is_traceable() {
             return None;
         }
-        let hit = Hit { t: 0.0, barycentric: [0.0; 2], primitive: 0, instance: 0 };
         let mut instances =
-            Instances::<K, ANY> { targets: self, ray, hit, kernel: Default::default() };
+            Instances::<K, ANY> { targets: self, ray, hit: NOTHING, kernel: Default::default() };
         let slab = SlabRay::new(ray);
         walk::<K, ANY>(&self.top.nodes, &slab, t_max, stack, &mut instances)
             .then_some(instances.hit)
     }
 }
+
+/// Before anything is hit.
+pub(crate) const NOTHING: Hit = Hit { t: 0.0, barycentric: [0.0; 2], primitive: 0, instance: 0 };
 
 #[cfg(target_arch = "x86_64")]
 struct Closest<'a> {
@@ -275,7 +280,7 @@ impl<K: Kernel, const ANY: bool> Leaves for Instances<'_, K, ANY> {
 }
 
 #[inline(always)]
-fn in_mesh<K: Kernel, const ANY: bool>(
+pub(crate) fn in_mesh<K: Kernel, const ANY: bool>(
     blas: &Blas,
     ray: &Ray,
     instance: u32,

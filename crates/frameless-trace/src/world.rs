@@ -1,17 +1,22 @@
 //! A scene prepared for tracing.
 
+use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use frameless_scene::{Geometry, Mesh, Scene};
+use glam::Vec3A;
 use rayon::prelude::*;
 
 use crate::build::Blas;
 use crate::deforming::Deforming;
 use crate::emitters::Emitters;
+use crate::holes::may_have_holes;
 use crate::images::Mirrors;
 use crate::kernel::Isa;
-use crate::texture::linear_from_srgb_table;
+use crate::matter::is_plain;
+use crate::surroundings::Surroundings;
+use crate::texture::Copies;
 
 /// A [`Scene`] prepared for tracing: what does not change with time. Immutable; share it in an [`Arc`].
 pub struct World {
@@ -20,9 +25,18 @@ pub struct World {
     pub(crate) blas: Vec<Blas>,
     /// Per deformation of the scene: what its first moment begins with.
     pub(crate) deforming: Vec<Deforming>,
-    pub(crate) linear_from_srgb: [f32; 256],
+    /// Smaller copies of the scene's pictures.
+    pub(crate) copies: Copies,
+    /// Per material, see [`is_plain`].
+    pub(crate) is_plain: Vec<bool>,
+    /// Per geometry: whether rays may pass some of its triangles.
+    pub(crate) holes: Vec<bool>,
+    /// Whether any has.
+    pub(crate) has_holes: bool,
     pub(crate) mirrors: Mirrors,
     pub(crate) emitters: Emitters,
+    /// The scene's environment.
+    pub(crate) surroundings: Option<Surroundings>,
     pub(crate) isa: Isa,
     /// Tells the moments of this world from those of others.
     pub(crate) id: u64,
@@ -42,15 +56,42 @@ impl World {
                 Geometry::Mesh(mesh) if is_rigid => Blas::new(mesh),
                 _ => Blas::new(&Mesh::default()),
             });
+        let holes: Vec<bool> = scene.geometries.iter().map(|g| has_holes(&scene, g)).collect();
         World {
+            has_holes: holes.contains(&true),
+            holes,
             blas: blas.collect(),
             deforming: Deforming::all(&scene),
             mirrors: Mirrors::new(&scene),
             emitters: Emitters::new(&scene),
+            surroundings: scene.environment.as_ref().map(Surroundings::new),
+            copies: Copies::new(&scene),
+            is_plain: scene.materials.iter().map(|m| is_plain(&scene, m)).collect(),
             scene,
-            linear_from_srgb: linear_from_srgb_table(),
             isa,
             id: WORLDS.fetch_add(1, Ordering::Relaxed),
+        }
+    }
+
+    /// What comes from far away, along a direction of any length: the environment, else the sky, mixed between straight down and straight up
+    /// by the direction's height.
+    #[inline]
+    pub(crate) fn sky(&self, direction: Vec3A) -> Vec3A {
+        if let Some(surroundings) = &self.surroundings {
+            return surroundings.radiance(direction.normalize_or_zero());
+        }
+        let [down, up] = self.scene.sky.map(Vec3A::from);
+        let height = direction.normalize_or_zero().y;
+        down.lerp(up, 0.5 + 0.5 * height)
+    }
+
+    /// What a white matte surface that nothing shades sends back of ambient light.
+    #[inline]
+    pub(crate) fn ambient(&self, normal: Vec3A) -> Vec3A {
+        let ambient = Vec3A::from(self.scene.ambient);
+        match &self.surroundings {
+            None => ambient,
+            Some(surroundings) => ambient + surroundings.irradiance(normal) * FRAC_1_PI,
         }
     }
 
@@ -58,6 +99,10 @@ impl World {
     pub fn scene(&self) -> &Arc<Scene> {
         &self.scene
     }
+}
+
+fn has_holes(scene: &Scene, geometry: &Geometry) -> bool {
+    matches!(geometry, Geometry::Mesh(mesh) if may_have_holes(scene, mesh))
 }
 
 /// Per geometry, whether any of its instances does not deform.

@@ -197,7 +197,7 @@ fn jpeg(image: &RgbImage, quality: u8, factor: SamplingFactor) -> Result<Vec<u8>
     Ok(bytes)
 }
 
-/// As the server has it.
+/// Equal steps for all frequencies, nearly as the server has them (it gives a block's mean finer ones).
 fn jpeg_flat(image: &RgbImage, quality: u8) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = jpeg_encoder::Encoder::new(&mut bytes, quality);

@@ -1,4 +1,4 @@
-//! What pictures weigh as whole JPEG frames of quality 75, by the encoder that the stream's tiles are made with: the bytes of
+//! What pictures weigh as whole JPEG frames of quality 75, by the encoder that the stream's tiles are made with, set as there: the bytes of
 //! each of the PNG files that are named, one number per line.
 
 use std::fs::File;
@@ -23,7 +23,9 @@ fn weigh(path: &str) -> Result<usize> {
     ensure!(info.color_type == png::ColorType::Rgb, "wanted RGB, got {:?}", info.color_type);
     let (width, height) = (u16::try_from(info.width)?, u16::try_from(info.height)?);
     let mut jpeg = Vec::new();
-    let encoder = jpeg_encoder::Encoder::new(&mut jpeg, QUALITY);
+    let mut encoder = jpeg_encoder::Encoder::new(&mut jpeg, QUALITY);
+    // As tiles are encoded, too: 2 % less.
+    encoder.set_optimized_huffman_tables(true);
     encoder.encode(&rgb[..info.buffer_size()], width, height, jpeg_encoder::ColorType::Rgb)?;
     Ok(jpeg.len())
 }

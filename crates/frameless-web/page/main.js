@@ -163,7 +163,7 @@ async function findOutWhy(reason) {
 
 function showBanner(text, tries = true) {
   if (byId("banner-text").textContent !== text) byId("banner-text").textContent = text;
-  byId("banner-spinner").hidden = !tries;
+  byId("banner-spinner").hidden = byId("banner-retry").hidden = !tries;
 }
 
 picture.onDrawn = (message) => {

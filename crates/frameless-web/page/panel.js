@@ -3,8 +3,8 @@
 import { metric } from "./format.js";
 
 const SIZES = [
-  ["window", "as the page, coarser if it is large"],
-  ["whole-window", "every pixel of the page"],
+  ["window", "page, coarse if large"],
+  ["whole-window", "page, every pixel"],
   ...["320x240", "512x384", "640x480", "1024x768", "1280x720", "1920x1080"].map((size) => [size, size.replace("x", " × ")]),
 ];
 const OPTIONS = ["relight", "deep", "antialias"];
@@ -62,7 +62,7 @@ export class Panel {
 
   /** The scene and its cameras. */
   scene({ name, cameras }) {
-    byId("scene-name").textContent = name;
+    byId("scene-name").textContent = byId("scene-name").title = name;
     const free = Object.assign(option("", "free camera"), { disabled: true });
     byId("camera").replaceChildren(free, ...cameras.map((camera, index) => option(String(index), camera)));
   }

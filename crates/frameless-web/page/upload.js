@@ -5,6 +5,8 @@ const byId = (id) => document.getElementById(id);
 export class Upload {
   #messages;
   #request = null;
+  // What was wrong the last time.
+  #failed = "";
   /** What the server allows: bytes, and the token by which it knows this page. */
   limit = { bytes: 0, token: "" };
   /** Whether this page may. */
@@ -24,8 +26,10 @@ export class Upload {
   /** Sends a file; what came of it is said. */
   send(file) {
     const wrong = this.#whatIsWrong(file);
+    this.#messages.forget(this.#failed);
     if (wrong) {
       this.#messages.error(wrong);
+      this.#failed = wrong;
       return;
     }
     const url = new URL("upload", location.href);
@@ -64,6 +68,7 @@ export class Upload {
   #ended(level, text) {
     this.#request = null;
     byId("upload").hidden = true;
+    this.#failed = level === "error" ? text : "";
     if (text) this.#messages.say(level, text);
   }
 

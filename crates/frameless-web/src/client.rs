@@ -81,9 +81,7 @@ struct Connection {
     // None while a message is being made.
     outgoing: Option<Outgoing>,
     making: Option<JoinHandle<Ready>>,
-    // There may be something to send.
-    look: bool,
-    look_at: Option<Instant>,
+    look: Look,
     // The canvas is this picture, once all that was sent is drawn.
     exact: Option<Arc<Published>>,
     heard_at: Instant,
@@ -91,6 +89,16 @@ struct Connection {
     moved: (u32, usize),
     sent_bytes: u64,
     status: StatusMeter,
+}
+
+/// When there may be something to send.
+#[derive(Clone, Copy)]
+enum Look {
+    /// As soon as there is room.
+    Now,
+    At(Instant),
+    /// When something has happened.
+    Later,
 }
 
 /// When to send a status, and what was sent meanwhile.
@@ -128,8 +136,7 @@ impl Connection {
             flow: Flow::new(now),
             outgoing: Some(Outgoing::new(now)),
             making: None,
-            look: true,
-            look_at: None,
+            look: Look::Now,
             exact: None,
             heard_at: now,
             moved: (0, 0),
@@ -147,7 +154,6 @@ impl Connection {
         let mailbox = Arc::clone(&self.mailbox);
         loop {
             self.make();
-            let later = self.look_at.filter(|_| self.making.is_none());
             let outcome = tokio::select! {
                 message = self.socket.recv() => match message {
                     Some(Ok(message)) => self.hear(message).await,
@@ -158,7 +164,7 @@ impl Connection {
                     None => Err(End::Gone),
                 },
                 changed = pictures.changed() => {
-                    self.look = true;
+                    self.look = Look::Now;
                     changed.map_err(|_| End::Gone)
                 }
                 text = mailbox.next() => match text {
@@ -168,8 +174,8 @@ impl Connection {
                 _ = status.tick() => self.send_status().await,
                 _ = ping.tick() => self.send(Message::Ping(Default::default())).await,
                 _ = check.tick() => self.check_stalled(),
-                () = at(later), if later.is_some() => {
-                    self.look = true;
+                () = self.look.its_moment() => {
+                    self.look = Look::Now;
                     Ok(())
                 }
             };
@@ -182,14 +188,14 @@ impl Connection {
     /// Begins to make a message, if there may be something to send and there is room for it.
     fn make(&mut self) {
         let room = self.flow.room();
-        if !self.look || room == 0 {
+        if !matches!(self.look, Look::Now) || room == 0 {
             return;
         }
         if self.hub.pictures.borrow().is_none() {
             return;
         }
         let Some(outgoing) = self.outgoing.take() else { return };
-        (self.look, self.look_at) = (false, None);
+        self.look = Look::Later;
         let room = Room {
             bytes: room,
             window: self.flow.window(),
@@ -211,12 +217,15 @@ impl Connection {
         let Ready { outgoing, picture, message, moves, all_exact, wait } = ready;
         self.outgoing = Some(outgoing);
         let now = Instant::now();
-        self.look_at = wait.map(|wait| now + wait);
+        // Unless something has happened meanwhile.
+        if let (Look::Later, Some(wait)) = (self.look, wait) {
+            self.look = Look::At(now + wait);
+        }
         let number = picture.number;
         self.exact = all_exact.then_some(picture);
         if let Some(message) = message {
             // What else is there to send is seen when it has been sent.
-            self.look = true;
+            self.look = Look::Now;
             self.flow.send(message.len(), now);
             if moves {
                 let before = if self.moved.0 == number { self.moved.1 } else { 0 };
@@ -225,6 +234,7 @@ impl Connection {
             }
             self.send(Message::binary(message)).await?;
         }
+        self.tell_drawn();
         let exact = self.exact.as_ref().map(|picture| picture.number);
         if exact.is_some() && exact != self.status.last_exact {
             self.tell_status().await?;
@@ -249,10 +259,21 @@ impl Connection {
                 self.flow.acknowledge(sequence, now).map_err(|_| {
                     let (what, wanted) = ("sequence number", "one that is on its way");
                     End::Invalid(WireError::Value { what, wanted, came: sequence.to_string() })
-                })
+                })?;
+                self.tell_drawn();
+                Ok(())
             }
             Message::Ping(_) | Message::Pong(_) => Ok(()),
             Message::Close(_) => Err(End::Gone),
+        }
+    }
+
+    /// Tells the hub once all of a picture has been sent, and acknowledged.
+    fn tell_drawn(&self) {
+        if let Some(exact) = &self.exact
+            && self.flow.waiting_since().is_none()
+        {
+            self.hub.drawn(exact.number);
         }
     }
 
@@ -365,9 +386,12 @@ async fn joined(making: &mut Option<JoinHandle<Ready>>) -> Option<Ready> {
     ready
 }
 
-async fn at(instant: Option<Instant>) {
-    match instant {
-        Some(instant) => sleep_until(instant.into()).await,
-        None => std::future::pending().await,
+impl Look {
+    /// Ends at the moment that is waited for, and else never.
+    async fn its_moment(self) {
+        match self {
+            Look::At(moment) => sleep_until(moment.into()).await,
+            Look::Now | Look::Later => std::future::pending().await,
+        }
     }
 }

@@ -30,7 +30,7 @@ use crate::mailbox::Kind;
 use crate::roster::Roster;
 use crate::settings;
 use crate::show::{Scenes, Show};
-use crate::tiles::{Published, Publisher, Taken};
+use crate::tiles::{Occasion, Published, Publisher, Taken};
 use crate::wire::{Level, Said, Told};
 
 /// While nothing happens a picture is made this often, in case something does. The first one after something has is made at once.
@@ -111,6 +111,7 @@ where
         statuses: status,
         painted: Arc::default(),
         moved_bytes: Arc::default(),
+        drawn: Arc::default(),
         lookers: Arc::default(),
     };
     let Show { session, helm, scenes } = show;
@@ -418,7 +419,8 @@ impl<W: Send + 'static> Hub<W> {
         }
         self.hear_status(&picture.status);
         let new_input = self.inputs.shown_by(picture.mark);
-        let taken = self.publisher.take(picture, self.inputs.shown(), new_input, Instant::now());
+        let occasion = self.occasion(&picture, new_input);
+        let taken = self.publisher.take(picture, self.inputs.shown(), occasion, Instant::now());
         match taken {
             Taken::Same(memory) => self.memory = Some(memory),
             Taken::New(published) => {
@@ -427,6 +429,26 @@ impl<W: Send + 'static> Hub<W> {
                 let memory = before.and_then(Arc::into_inner).map(|published| published.rgba);
                 self.memory = Some(memory.unwrap_or_default());
             }
+        }
+    }
+
+    /// A renderer that needs seconds for a picture refines none: what is new is shown at once.
+    fn occasion(&self, picture: &Picture, new_input: bool) -> Occasion {
+        let ends = self.scenes.is_some().then(|| self.helm.scene().animation.duration_secs);
+        let stands = !self.playing || ends == Some(0.0);
+        let is_fast = picture.status.samples_per_sec >= picture.size.pixels() as f64;
+        if new_input {
+            Occasion::Input
+        } else if stands
+            && is_fast
+            && self.overlay.is_none()
+            && self.acted_at.elapsed() >= HURRIED_FOR
+        {
+            let drawn = self.handle.drawn.load(Ordering::Relaxed);
+            let is_drawn = self.roster.is_empty() || drawn >= self.publisher.last_number();
+            Occasion::Refinement { is_drawn }
+        } else {
+            Occasion::Motion
         }
     }
 

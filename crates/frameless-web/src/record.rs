@@ -260,7 +260,7 @@ mod tests {
     use frameless_session::{Ages, Picture, Status};
 
     use super::*;
-    use crate::tiles::{Publisher, Taken};
+    use crate::tiles::{Occasion, Publisher, Taken};
 
     const SIZE: Size = Size { width: 65, height: 34 };
 
@@ -275,7 +275,7 @@ mod tests {
         let rgba = vec![[level, 255 - level, 40, 255]; size.pixels()];
         let picture = Picture { size, rgba, mark: 0, status };
         let now = Instant::now();
-        match Publisher::new(now).take(picture, Vec::new(), false, now) {
+        match Publisher::new(now).take(picture, Vec::new(), Occasion::Motion, now) {
             Taken::New(published) => published,
             Taken::Same(_) => panic!("the first picture is always published"),
         }

@@ -76,7 +76,7 @@ impl Server {
             let (address, port) = (options.address, options.address.port());
             match error.kind() {
                 std::io::ErrorKind::AddrInUse => anyhow!(
-                    "{address}: port {port} is taken, perhaps by another frameless; choose one with --port, or any free one with --port 0"
+                    "{address}: port {port} is taken, perhaps by another frameless; choose one with `frameless serve --port`, or any free one with --port 0"
                 ),
                 _ => anyhow!("cannot listen on {address}: {error}"),
             }

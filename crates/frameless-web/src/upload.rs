@@ -2,7 +2,7 @@
 
 use std::pin::Pin;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use axum::body::{Body, Bytes};
 use axum::extract::{Query, State};
@@ -16,6 +16,9 @@ use crate::routes::{App, Shared};
 
 /// Holds the token that the client was welcomed with. A page of another site could set no such header without being asked.
 const CLIENT: HeaderName = HeaderName::from_static("x-client");
+
+/// While a file comes it is asked so often whether its client may still send one: a slow one keeps the others waiting.
+const BETWEEN_QUESTIONS: Duration = Duration::from_millis(500);
 
 /// A status, and what the user is to read.
 type Answer = (StatusCode, String);
@@ -44,15 +47,21 @@ async fn receive(
 ) -> Result<Answer, Answer> {
     let text = |header| headers.get(header).and_then(|value| value.to_str().ok());
     let token = text(CLIENT).unwrap_or("").to_owned();
-    let client = ask(shared, |answer| Event::MayUpload { token, answer }).await?;
+    let client = may_upload(shared, &token).await?;
     let busy = |_| (StatusCode::SERVICE_UNAVAILABLE, "another file is being uploaded".to_owned());
     let _turn = Arc::clone(&shared.uploading).try_acquire_owned().map_err(busy)?;
     let announced = text(header::CONTENT_LENGTH).and_then(|length| length.parse().ok());
-    let bytes = collect(body, shared, announced.unwrap_or(0)).await?;
+    let bytes = collect(body, shared, announced.unwrap_or(0), &token).await?;
     let name = shown_name(&query.name);
     let opened =
         ask(shared, |answer| Event::Upload(Upload { client, name, bytes, answer })).await?;
     Ok((StatusCode::OK, opened))
+}
+
+/// The number of the client with that token, if it may send a file now.
+async fn may_upload(shared: &Shared, token: &str) -> Result<u32, Answer> {
+    let token = token.to_owned();
+    ask(shared, |answer| Event::MayUpload { token, answer }).await
 }
 
 /// What the hub says to an event.
@@ -86,8 +95,13 @@ fn explain(refused: UploadRefused) -> Answer {
     (status, text.to_owned())
 }
 
-/// All of a body, unless it is too long or stalls.
-async fn collect(body: Body, shared: &Shared, announced: u64) -> Result<Vec<u8>, Answer> {
+/// All of a body, unless it is too long or stalls, or whoever sends it may no longer.
+async fn collect(
+    body: Body,
+    shared: &Shared,
+    announced: u64,
+    token: &str,
+) -> Result<Vec<u8>, Answer> {
     let most = shared.upload_bytes;
     let too_large = || {
         let text = format!("the file is too large: at most {most} bytes are taken");
@@ -97,12 +111,16 @@ async fn collect(body: Body, shared: &Shared, announced: u64) -> Result<Vec<u8>,
         return Err(too_large());
     }
     let mut stream = body.into_data_stream();
-    let mut bytes = Vec::new();
+    let (mut bytes, mut asked_at) = (Vec::new(), Instant::now());
     while let Some(piece) = next_piece(&mut stream, shared.stalled).await? {
         if (bytes.len() + piece.len()) as u64 > most {
             return Err(too_large());
         }
         bytes.extend_from_slice(&piece);
+        if asked_at.elapsed() >= BETWEEN_QUESTIONS {
+            may_upload(shared, token).await?;
+            asked_at = Instant::now();
+        }
     }
     Ok(bytes)
 }

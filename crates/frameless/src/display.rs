@@ -3,6 +3,8 @@
 //! Samples are kept as linear radiance; this step comes after reconstruction, so that changing the exposure
 //! restarts nothing. Change is measured behind it, since that is what an eye sees.
 
+use std::hint::select_unpredictable;
+
 use crate::ToneMap;
 
 /// How linear radiance becomes a display colour.
@@ -130,7 +132,8 @@ fn srgb_from_linear(linear: f32) -> f32 {
         + 0.081_327_64 * x
         - 0.064_611_68;
     let line = 12.92 * x;
-    if x <= 0.003_130_8 { line } else { power.min(1.0) }
+    // Both, and no branch: it would keep the channels from being worked on at once.
+    select_unpredictable(x <= 0.003_130_8, line, power.min(1.0))
 }
 
 #[cfg(test)]

@@ -40,6 +40,21 @@ fn a_missing_scene_is_named() {
 }
 
 #[test]
+fn an_environment_that_is_none_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = folder.path().join("text.hdr");
+    std::fs::write(&text, "no picture").unwrap();
+    let (text, out) = (text.to_string_lossy(), folder.path().join("out.png"));
+    let render = ["render", "sphere", "--size", "8x8", "-o", &out.to_string_lossy()];
+    let with = |more: &[&str]| frameless(&[&render[..], more].concat());
+    with(&["--env", "missing.hdr"]).refused(2, "missing.hdr");
+    with(&["--env", &text]).refused(2, "wanted a Radiance picture");
+    with(&["--env-rotation", "90"]).refused(2, "--env");
+    with(&["--env", &text, "--env-strength", "0"]).refused(2, "above zero");
+    assert_eq!(files_in(folder.path()), 1);
+}
+
+#[test]
 fn what_is_no_scene_leaves_no_picture() {
     let folder = tempfile::tempdir().unwrap();
     for (name, content) in [

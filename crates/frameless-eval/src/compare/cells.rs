@@ -9,7 +9,7 @@ use crate::run::Cell;
 
 /// Increased whenever a tracer, an algorithm, a metric or the way pictures are made gives other results for the same input:
 /// cells of other versions are not used again.
-const CODE_VERSION: u32 = 6;
+const CODE_VERSION: u32 = 7;
 
 /// The runs of a scene: rates, algorithms, seeds, in this order. What is not random runs with the first seed only.
 pub(super) fn cells_of(experiment: &Experiment, spec: &SceneSpec) -> Vec<Cell> {

@@ -3,8 +3,8 @@
 use glam::{Quat, Vec2, Vec3, Vec4};
 
 use crate::{
-    Camera, Channel, Filter, Geometry, Image, Instance, Light, LightKind, Material, Mesh, Node,
-    Projection, Scene, Texture, TextureRef, Transform, Wrap,
+    Camera, Channel, Filter, Geometry, Image, Instance, Light, LightKind, Material, Mesh, Minify,
+    Node, Projection, Scene, Texture, TextureRef, Transform, Wrap,
 };
 
 /// A scene under construction. Everything that is added answers with its index.
@@ -41,9 +41,11 @@ impl Builder {
                 image: push(&mut self.scene.images, image),
                 wrap: [Wrap::Repeat; 2],
                 filter: Filter::Linear,
+                // Samples are points: what is measured on these scenes should not depend on how large a pixel is.
+                minify: Minify::default(),
             },
         );
-        let base_color_texture = Some(TextureRef { texture, uv_set: 0 });
+        let base_color_texture = Some(TextureRef::plain(texture));
         push(&mut self.scene.materials, Material { base_color_texture, ..Material::default() })
     }
 

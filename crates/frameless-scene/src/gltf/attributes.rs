@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::{Vec2, Vec3, Vec4};
 
-use crate::Influences;
+use crate::{Influences, UV_SETS};
 
 use super::accessor::Accessor;
 use super::error::{Fault, quoted};
@@ -20,7 +20,8 @@ const LARGEST_COORDINATE: f32 = 1e18;
 pub(super) struct Attributes {
     pub(super) position: Option<usize>,
     pub(super) normal: Option<usize>,
-    pub(super) uvs: [Option<usize>; 2],
+    pub(super) uvs: [Option<usize>; UV_SETS],
+    pub(super) tangent: Option<usize>,
     pub(super) color: Option<usize>,
     /// JOINTS_n and WEIGHTS_n, in the order of n.
     pub(super) influences: Vec<[usize; 2]>,
@@ -50,8 +51,11 @@ impl Attributes {
             match *semantic {
                 "POSITION" => attributes.position = Some(accessor),
                 "NORMAL" => attributes.normal = Some(accessor),
+                "TANGENT" => attributes.tangent = Some(accessor),
                 "TEXCOORD_0" => attributes.uvs[0] = Some(accessor),
                 "TEXCOORD_1" => attributes.uvs[1] = Some(accessor),
+                "TEXCOORD_2" => attributes.uvs[2] = Some(accessor),
+                "TEXCOORD_3" => attributes.uvs[3] = Some(accessor),
                 "COLOR_0" => attributes.color = Some(accessor),
                 other if is_silently_ignored(other) => {}
                 other => match influence(other) {
@@ -101,8 +105,7 @@ impl TargetAttributes {
     }
 }
 
-/// Tangents say nothing without normal maps, which are warned about where they are used; names that begin with an underscore
-/// belong to applications.
+/// Names that begin with an underscore belong to applications; a morphed tangent follows from what its triangle has become.
 fn is_silently_ignored(semantic: &str) -> bool {
     semantic == "TANGENT" || semantic.starts_with('_')
 }
@@ -138,7 +141,9 @@ pub(super) struct Vertices {
     pub(super) positions: Vec<Vec3>,
     /// As in the file: may be of any length, or NaN.
     pub(super) normals: Option<Vec<Vec3>>,
-    pub(super) uvs: [Option<Vec<Vec2>>; 2],
+    pub(super) uvs: [Option<Vec<Vec2>>; UV_SETS],
+    /// As in the file: may be of any length, or NaN.
+    pub(super) tangents: Option<Vec<Vec4>>,
     pub(super) colors: Option<Vec<Vec4>>,
     /// As in the file: weights may be anything.
     pub(super) influences: Vec<Influences>,
@@ -214,6 +219,9 @@ impl Vertices {
                 warnings,
             );
             *uvs = Some(read);
+        }
+        if let Some(accessor) = attributes.tangent {
+            vertices.tangents = Some(vectors(accessors[accessor].numbers::<4>(budget)?));
         }
         if let Some(accessor) = attributes.color {
             let mut colors = read_colors(&accessors[accessor], 1.0, budget)?;

@@ -2,7 +2,9 @@
 
 use glam::{Quat, Vec3};
 
-use crate::{Bounds, Camera, Geometry, Light, LightKind, Node, Projection, Scene, Transform};
+use crate::{
+    Bounds, Camera, Geometry, Light, LightKind, Material, Node, Projection, Scene, Transform,
+};
 use crate::{frame_bounds, look_at};
 
 /// The angle between the top and the bottom of the added camera's picture: 40°, between a normal and a wide lens.
@@ -16,13 +18,21 @@ pub(super) fn add_camera(scene: &mut Scene) {
     const EMPTY: Bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
     /// Half a millimetre: nearer than this, a camera would frame rounding errors.
     const SMALLEST_RADIUS: f32 = 5e-4;
+    /// The same of the distance from the origin.
+    const SMALLEST_SHARE: f32 = 1e-6;
+    /// A hundred light years in kilometres: squares of what is farther away are infinite.
+    const FARTHEST: Vec3 = Vec3::splat(1e15);
     if !scene.cameras.is_empty() {
         return;
     }
     let mut bounds = scene.bounds_at(&scene.state_at(0.0)).unwrap_or(EMPTY);
-    if bounds.radius() < SMALLEST_RADIUS {
-        let centre = bounds.centre();
-        bounds = Bounds { min: centre - Vec3::splat(0.5), max: centre + Vec3::splat(0.5) };
+    bounds.min = bounds.min.clamp(-FARTHEST, FARTHEST);
+    bounds.max = bounds.max.clamp(-FARTHEST, FARTHEST);
+    let centre = bounds.centre();
+    let rounding = SMALLEST_SHARE * centre.abs().max_element();
+    if bounds.radius() < SMALLEST_RADIUS.max(rounding) {
+        let half = Vec3::splat(0.5f32.max(100.0 * rounding));
+        bounds = Bounds { min: centre - half, max: centre + half };
     }
     let view = frame_bounds(bounds, YFOV_RAD, ASPECT);
     let (_, rotation, translation) = view.world_from_camera.to_scale_rotation_translation();
@@ -32,24 +42,27 @@ pub(super) fn add_camera(scene: &mut Scene) {
     scene.notes.push("no camera in the file: added one that shows everything".to_owned());
 }
 
+/// How notes of added light begin.
+pub(crate) const NO_LIGHT: &str = "no light in the file";
+
 /// Adds light, if the scene has no lights: all of it, or a little where surfaces glow.
 pub(super) fn add_light(scene: &mut Scene) {
     if !scene.lights.is_empty() {
         return;
     }
+    scene.has_added_light = true;
     if has_glowing_triangles(scene) {
         // Lets the scene be seen by renderers that do not follow light from glowing surfaces to others.
         scene.ambient = Vec3::splat(0.2);
-        let note = "no light in the file but glowing surfaces: added faint ambient light";
-        scene.notes.push(note.to_owned());
+        scene.notes.push(format!("{NO_LIGHT} but glowing surfaces: added faint ambient light"));
         return;
     }
     add_key_light(scene);
     // With the key light a white matte surface reaches a radiance of 1 where it faces the light, and 0.25 in its shadow.
     scene.ambient = Vec3::splat(0.25);
     scene.sky = [Vec3::new(0.25, 0.24, 0.23), Vec3::new(0.55, 0.7, 0.9)];
-    let note = "no light in the file: added a key light from above, ambient light and a sky";
-    scene.notes.push(note.to_owned());
+    let note = format!("{NO_LIGHT}: added a key light from above, ambient light and a sky");
+    scene.notes.push(note);
 }
 
 /// A sun behind the added camera's left shoulder, so that what it shows has both lit and shaded sides.
@@ -72,9 +85,9 @@ fn add_key_light(scene: &mut Scene) {
 fn has_glowing_triangles(scene: &Scene) -> bool {
     /// What a white surface reaches in the added light; a lamp is brighter.
     const LAMP_RADIANCE: f32 = 1.0;
-    let glows = |material: &u32| {
-        scene.materials[*material as usize].emissive.max_element() >= LAMP_RADIANCE
-    };
+    let is_lamp = |m: &Material| scene.mean_radiance(m).max_element() >= LAMP_RADIANCE;
+    let lamps: Vec<bool> = scene.materials.iter().map(is_lamp).collect();
+    let glows = |material: &u32| lamps[*material as usize];
     scene.instances.iter().any(|instance| match &scene.geometries[instance.geometry as usize] {
         Geometry::Mesh(mesh) => mesh.triangle_materials.iter().any(glows),
         Geometry::Sphere { material } => glows(material),

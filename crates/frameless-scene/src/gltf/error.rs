@@ -102,7 +102,7 @@ pub(super) fn quoted(text: &str) -> String {
 }
 
 /// What another library says about a file, fit for a message: one line of at most 120 characters.
-pub(super) fn one_line(message: &dyn fmt::Display) -> String {
+pub(crate) fn one_line(message: &dyn fmt::Display) -> String {
     let message = message.to_string();
     let (shown, rest) = split_after(message.trim(), 120);
     let shown: String =

@@ -9,14 +9,21 @@ use super::json::Json;
 use super::warnings::Warnings;
 
 /// Extensions that are read. What of them is not drawn is warned about where it occurs.
-const SUPPORTED: [&str; 7] = [
+const SUPPORTED: [&str; 14] = [
     "EXT_mesh_gpu_instancing",
     super::compressed::NAME,
     "EXT_texture_webp",
     "KHR_lights_punctual",
+    "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
     "KHR_materials_unlit",
+    "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_texture_transform",
 ];
 
 /// Refuses a file that cannot be understood without an extension which is not supported; warns of those without which it can.

@@ -5,7 +5,6 @@
 
 use std::io::Cursor;
 
-use glam::DVec4;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use crate::Image;
@@ -49,19 +48,6 @@ impl<'a> FileImage<'a> {
             document.warnings.about(what, self.called_with(&fault));
             checker()
         })
-    }
-
-    /// The mean of all texels with RGB made linear, for textures that are not drawn texel by texel; `None`, with a warning,
-    /// if it cannot be decoded.
-    pub(super) fn mean(&self, decode_srgb: bool, document: &mut Document<'_>) -> Option<DVec4> {
-        match self.try_decode(document) {
-            Ok(image) => Some(mean(&image, decode_srgb)),
-            Err(fault) => {
-                let what = "images that cannot be read are left out";
-                document.warnings.about(what, self.called_with(&fault));
-                None
-            }
-        }
     }
 
     fn called_with(&self, fault: &Fault) -> String {
@@ -117,37 +103,4 @@ fn checker() -> Image {
     const COLORS: [[u8; 4]; 2] = [[255, 0, 255, 255], [128, 128, 128, 255]];
     let texel = |i: u32| COLORS[((i / SIDE + i % SIDE) % 2) as usize];
     Image { width: SIDE, height: SIDE, rgba: (0..SIDE * SIDE).map(texel).collect() }
-}
-
-fn mean(image: &Image, decode_srgb: bool) -> DVec4 {
-    let linear: [f64; 256] = std::array::from_fn(|code| {
-        let value = code as f64 / 255.0;
-        if decode_srgb { linear_from_srgb(value) } else { value }
-    });
-    let sum: DVec4 = image
-        .rgba
-        .iter()
-        .map(|&[r, g, b, a]| {
-            let [r, g, b] = [r, g, b].map(|code| linear[usize::from(code)]);
-            DVec4::new(r, g, b, f64::from(a) / 255.0)
-        })
-        .sum();
-    sum / image.rgba.len() as f64
-}
-
-/// The sRGB transfer function (IEC 61966-2-1), in and out in [0, 1].
-fn linear_from_srgb(value: f64) -> f64 {
-    if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_mean_of_srgb_is_taken_in_linear_light() {
-        let image = Image { width: 2, height: 1, rgba: vec![[0, 0, 0, 255], [255, 128, 255, 255]] };
-        let mean = mean(&image, true);
-        assert!((mean - DVec4::new(0.5, 0.107_93, 0.5, 1.0)).abs().max_element() < 1e-4, "{mean}");
-    }
 }

@@ -105,8 +105,28 @@ impl Budget {
         within(pixels, self.limits.image_pixels, "pixels in one image", pointer)?;
         spend(&mut self.pixels, pixels, self.limits.total_pixels, "pixels in all images", pointer)?;
         let limit = self.limits.decoded_bytes;
-        spend(&mut self.bytes, pixels.saturating_mul(4), limit, "decoded bytes", pointer)
+        spend(&mut self.bytes, image_bytes(pixels), limit, "decoded bytes", pointer)
     }
+}
+
+/// Four per texel, and a third more for the smaller copies that distance needs; twice that, if a picture is used as colours and as
+/// numbers.
+fn image_bytes(pixels: u64) -> u64 {
+    pixels.saturating_mul(4 * 5) / 3
+}
+
+/// Refuses a picture of what is far away that is larger than allowed: three numbers per texel, and two more to draw from it.
+pub(crate) fn check_environment_size(
+    width: u32,
+    height: u32,
+    limits: &Limits,
+) -> Result<(), Problem> {
+    const BYTES_PER_TEXEL: u64 = 5 * 4;
+    let pixels = u64::from(width) * u64::from(height);
+    let bytes = pixels.saturating_mul(BYTES_PER_TEXEL);
+    within(pixels, limits.image_pixels, "pixels in one image", "")
+        .and_then(|()| within(bytes, limits.decoded_bytes, "decoded bytes", ""))
+        .map_err(|fault| fault.problem)
 }
 
 /// Adds `more` to `total` unless that would pass `limit`.

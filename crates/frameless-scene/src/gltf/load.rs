@@ -38,7 +38,7 @@ pub fn load(path: &Path, limits: &Limits) -> Result<Scene, LoadError> {
 /// Like [`load`], but shows the scene and plays the animations that are chosen.
 pub fn load_chosen(path: &Path, choice: &Choice, limits: &Limits) -> Result<Scene, LoadError> {
     let shown = path.display().to_string();
-    let bytes = read(path, limits).map_err(|fault| fault.in_file(&shown))?;
+    let bytes = read_whole(path, limits)?;
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -57,6 +57,11 @@ pub fn load_bytes(
     limits: &Limits,
 ) -> Result<Scene, LoadError> {
     from_bytes(name, bytes, folder, &Choice::default(), limits).map_err(|fault| fault.in_file(name))
+}
+
+/// The bytes of a plain file within the limits.
+pub(crate) fn read_whole(path: &Path, limits: &Limits) -> Result<Vec<u8>, LoadError> {
+    read(path, limits).map_err(|fault| fault.in_file(&path.display().to_string()))
 }
 
 fn read(path: &Path, limits: &Limits) -> Result<Vec<u8>, Fault> {

@@ -1,12 +1,13 @@
 //! Materials: the metallic-roughness model (glTF 2.0 §3.9).
 
-use glam::{DVec4, Vec3, Vec4};
+use glam::{Vec3, Vec4};
 
-use crate::Material;
+use crate::{AlphaMode, Material, TextureRef};
 
 use super::document::Document;
 use super::error::Fault;
 use super::json::Json;
+use super::layers::load_layers;
 use super::texture::Textures;
 use super::warnings::Warnings;
 
@@ -28,28 +29,23 @@ fn load_material(
     let mut material = Material {
         name: json.name(),
         metallic: 1.0,
-        roughness: 1.0,
         double_sided: json.flag("doubleSided")?,
-        emissive: load_emissive(json, &owner, document, textures)?,
+        alpha_mode: load_alpha_mode(json)?,
+        unlit: json.extension("KHR_materials_unlit")?.is_some(),
         ..Material::default()
     };
     if let Some(pbr) = json.field("pbrMetallicRoughness")? {
         load_metallic_roughness(&pbr, &mut material, &owner, document, textures)?;
     }
-    if json.extension("KHR_materials_unlit")?.is_some() {
-        document.warnings.about("unlit materials are drawn lit and matte", &*owner);
-        (material.metallic, material.roughness, material.specular) = (0.0, 1.0, 0.0);
-    }
-    warn_of_alpha(json, &owner, document)?;
-    for (key, what) in [
-        ("normalTexture", "normal textures are not drawn"),
-        ("occlusionTexture", "occlusion textures are not drawn"),
-    ] {
-        if let Some(info) = json.field(key)? {
-            textures.check(&info)?;
-            document.warnings.about(what, &*owner);
-        }
-    }
+    load_emissive(json, &mut material, &owner, document, textures)?;
+    let scaled = ["normalTexture", "scale"];
+    material.normal_texture = refer_scaled(json, scaled, &owner, document, textures)?;
+    let scaled = ["occlusionTexture", "strength"];
+    let occlusion = refer_scaled(json, scaled, &owner, document, textures)?;
+    material.occlusion_texture = occlusion.map(|(texture, strength)| {
+        (texture, unit_interval(strength, &owner, &mut document.warnings))
+    });
+    load_layers(json, &mut material, &owner, document, textures)?;
     Ok(material)
 }
 
@@ -63,47 +59,47 @@ fn load_metallic_roughness(
     let warnings = &mut document.warnings;
     let color = pbr.numbers_or("baseColorFactor", [1.0; 4])?;
     material.base_color = Vec4::from_array(color.map(|x| unit_interval(x, owner, warnings)));
-    let metallic = unit_interval(pbr.number_or("metallicFactor", 1.0)?, owner, warnings);
-    let roughness = unit_interval(pbr.number_or("roughnessFactor", 1.0)?, owner, warnings);
-    if let Some(info) = pbr.field("baseColorTexture")? {
-        material.base_color_texture = textures.refer(&info, owner, document)?;
-    }
-    // Roughness is in the green channel, metalness in the blue one (glTF 2.0 §3.9.2).
-    let mean = match pbr.field("metallicRoughnessTexture")? {
-        None => DVec4::ONE,
-        Some(info) => {
-            let what = "metallic-roughness textures are replaced by their mean";
-            document.warnings.about(what, owner);
-            textures.mean(&info, false, document)?.unwrap_or(DVec4::ONE)
-        }
-    };
-    material.metallic = metallic * mean.z as f32;
-    material.roughness = roughness * mean.y as f32;
+    material.metallic = unit_interval(pbr.number_or("metallicFactor", 1.0)?, owner, warnings);
+    material.roughness = unit_interval(pbr.number_or("roughnessFactor", 1.0)?, owner, warnings);
+    material.base_color_texture = textures.refer(pbr, "baseColorTexture", owner, document)?;
+    material.metallic_roughness_texture =
+        textures.refer(pbr, "metallicRoughnessTexture", owner, document)?;
     Ok(())
 }
 
-/// Factor · strength · mean of the texture. Without the mean, surfaces of which a small part glows would glow as a whole.
-fn load_emissive(
-    json: &Json<'_>,
+/// A texture, and the number that stands beside its index (1 if it does not).
+pub(super) fn refer_scaled(
+    holder: &Json<'_>,
+    [key, scale]: [&str; 2],
     owner: &str,
     document: &mut Document<'_>,
     textures: &mut Textures<'_>,
-) -> Result<Vec3, Fault> {
+) -> Result<Option<(TextureRef, f32)>, Fault> {
+    let Some(info) = holder.field(key)? else { return Ok(None) };
+    let scale = info.number_or(scale, 1.0)?;
+    let texture = textures.refer(holder, key, owner, document)?;
+    Ok(texture.map(|texture| (texture, scale)))
+}
+
+/// A texture of what does not shine is left out.
+fn load_emissive(
+    json: &Json<'_>,
+    material: &mut Material,
+    owner: &str,
+    document: &mut Document<'_>,
+    textures: &mut Textures<'_>,
+) -> Result<(), Fault> {
     let factor = json.numbers_or("emissiveFactor", [0.0; 3])?;
     let factor = factor.map(|x| unit_interval(x, owner, &mut document.warnings));
-    let mut emissive = Vec3::from_array(factor);
+    material.emissive = Vec3::from_array(factor);
     if let Some(extension) = json.extension("KHR_materials_emissive_strength")? {
-        emissive *= emissive_strength(&extension, owner, document)?;
+        material.emissive *= emissive_strength(&extension, owner, document)?;
     }
-    if let Some(info) = json.field("emissiveTexture")? {
-        textures.check(&info)?;
-        if emissive != Vec3::ZERO {
-            document.warnings.about("emissive textures are replaced by their mean", owner);
-            let mean = textures.mean(&info, true, document)?.unwrap_or(DVec4::ZERO);
-            emissive *= mean.truncate().as_vec3();
-        }
+    if material.emissive == Vec3::ZERO {
+        return textures.check_member(json, "emissiveTexture");
     }
-    Ok(emissive)
+    material.emissive_texture = textures.refer(json, "emissiveTexture", owner, document)?;
+    Ok(())
 }
 
 fn emissive_strength(
@@ -118,20 +114,20 @@ fn emissive_strength(
     Ok(strength.max(0.0))
 }
 
-fn warn_of_alpha(json: &Json<'_>, owner: &str, document: &mut Document<'_>) -> Result<(), Fault> {
-    let Some(mode) = json.field("alphaMode")? else { return Ok(()) };
-    let warnings = &mut document.warnings;
+fn load_alpha_mode(json: &Json<'_>) -> Result<AlphaMode, Fault> {
+    // JSON knows no NaN, and what is no 32-bit number is refused.
+    let cutoff = json.number_or("alphaCutoff", 0.5)?;
+    let Some(mode) = json.field("alphaMode")? else { return Ok(AlphaMode::Opaque) };
     match mode.text()? {
-        "OPAQUE" => {}
-        "BLEND" => warnings.about("alpha mode BLEND is drawn opaque", owner),
-        "MASK" => warnings.about("alpha mode MASK is drawn opaque", owner),
-        _ => return Err(mode.fault("OPAQUE, MASK or BLEND")),
+        "OPAQUE" => Ok(AlphaMode::Opaque),
+        "MASK" => Ok(AlphaMode::Mask { cutoff }),
+        "BLEND" => Ok(AlphaMode::Blend),
+        _ => Err(mode.fault("OPAQUE, MASK or BLEND")),
     }
-    Ok(())
 }
 
 /// `factor`, or the nearest that is in [0, 1].
-fn unit_interval(factor: f32, owner: &str, warnings: &mut Warnings) -> f32 {
+pub(super) fn unit_interval(factor: f32, owner: &str, warnings: &mut Warnings) -> f32 {
     if !(0.0..=1.0).contains(&factor) {
         warnings.about("material factors outside [0, 1] were moved there", owner);
     }

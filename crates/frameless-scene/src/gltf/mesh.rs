@@ -1,10 +1,11 @@
 //! A glTF mesh: its primitives joined to one [`Mesh`] with a material per triangle.
 
 use std::collections::HashMap;
+use std::rc::Rc;
 
 use glam::{Vec2, Vec3, Vec4};
 
-use crate::{Geometry, Material, Mesh, MorphTarget};
+use crate::{Geometry, Material, Mesh, MorphTarget, TextureRef, UV_SETS};
 
 use super::attributes::{Attributes, Vertices};
 use super::document::Document;
@@ -12,6 +13,7 @@ use super::error::Fault;
 use super::influences::{append_influences, settle_influences};
 use super::json::Json;
 use super::normals::{flatten, repair};
+use super::tangents;
 use super::topology::Topology;
 
 /// All meshes of the file, in its order; those without triangles are empty.
@@ -36,7 +38,7 @@ fn load_mesh(
     refuse_other_target_counts(&primitives)?;
     let shaded_smoothly = primitives.iter().any(|primitive| primitive.attributes.normal.is_some());
     let mut joiner =
-        Joiner { json, shaded_smoothly, mesh: Mesh::default(), first_vertex: HashMap::new() };
+        Joiner { json, shaded_smoothly, mesh: Mesh::default(), shared: HashMap::new() };
     for primitive in &primitives {
         warn_of_what_is_left_out(primitive, json, document, materials);
         if primitive.attributes.position.is_some() && primitive.topology.is_some() {
@@ -86,6 +88,8 @@ struct Primitive<'a> {
     material: Option<usize>,
     /// What triangles store.
     material_slot: u32,
+    /// Whose axes are asked for.
+    normal_map: Option<TextureRef>,
 }
 
 impl<'a> Primitive<'a> {
@@ -104,7 +108,9 @@ impl<'a> Primitive<'a> {
             Some(material) => Some(material.index(materials.len(), "materials")?),
             None => None,
         };
+        let normal_map = material.and_then(|material| normal_map(&materials[material]));
         Ok(Primitive {
+            normal_map,
             json: json.clone(),
             attributes,
             indices,
@@ -113,6 +119,12 @@ impl<'a> Primitive<'a> {
             material_slot: material.unwrap_or(materials.len()) as u32,
         })
     }
+}
+
+/// The normal map of the surface, else of its coat: where both have one, they are expected to lie alike.
+fn normal_map(material: &Material) -> Option<TextureRef> {
+    let coat = material.layers.as_ref().and_then(|layers| layers.clearcoat_normal_texture);
+    material.normal_texture.or(coat).map(|(texture, _)| texture)
 }
 
 fn warn_of_what_is_left_out(
@@ -128,8 +140,9 @@ fn warn_of_what_is_left_out(
     if primitive.attributes.position.is_none() {
         warn("primitives without POSITION are not drawn");
     }
-    let texture = primitive.material.and_then(|material| materials[material].base_color_texture);
-    if texture.is_some_and(|texture| primitive.attributes.uvs[texture.uv_set as usize].is_none()) {
+    let lacks = |texture: TextureRef| primitive.attributes.uvs[texture.uv_set as usize].is_none();
+    let material = primitive.material.map(|material| &materials[material]);
+    if material.is_some_and(|material| material.textures().any(|(texture, _)| lacks(texture))) {
         warn("a texture shows one texel only, as the mesh lacks its texture coordinates");
     }
 }
@@ -140,9 +153,19 @@ struct Joiner<'a> {
     /// Whether any primitive has normals, so that all need some.
     shaded_smoothly: bool,
     mesh: Mesh,
-    /// Where the vertices of an attribute set begin, and which of them are nowhere: primitives that share vertices in the
-    /// file share them here.
-    first_vertex: HashMap<Attributes, (u32, Vec<u32>)>,
+    /// Primitives that share vertices in the file share them here.
+    shared: HashMap<Attributes, Shared>,
+}
+
+/// The vertices of an attribute set.
+#[derive(Clone)]
+struct Shared {
+    /// Index of the first of them.
+    first: u32,
+    /// Those that are nowhere, counted from the first.
+    nowhere: Rc<Vec<u32>>,
+    /// As in the file.
+    tangents: Option<Rc<Vec<Vec4>>>,
 }
 
 impl Joiner<'_> {
@@ -154,20 +177,17 @@ impl Joiner<'_> {
             let pointer = primitive.json.pointer();
             document.budget.add_vertices(pointer, 3 * triangles.len())?;
             document.budget.allocate(pointer, 3 * triangles.len(), BYTES_PER_VERTEX)?;
-            let vertices = flatten(&shared, &mut triangles);
-            let (first, nowhere) = self.append_vertices(vertices);
-            self.append_triangles(primitive, &triangles, first, &nowhere);
-            return Ok(());
+            let appended = self.append_vertices(flatten(&shared, &mut triangles));
+            return self.append_triangles(primitive, &triangles, &appended, document);
         }
-        if !self.first_vertex.contains_key(&primitive.attributes) {
+        if !self.shared.contains_key(&primitive.attributes) {
             let mut vertices = self.read_vertices(&primitive.attributes, document)?;
             self.repair_normals(&mut vertices, &triangles, document);
             let appended = self.append_vertices(vertices);
-            self.first_vertex.insert(primitive.attributes.clone(), appended);
+            self.shared.insert(primitive.attributes.clone(), appended);
         }
-        let (first, nowhere) = self.first_vertex[&primitive.attributes].clone();
-        self.append_triangles(primitive, &triangles, first, &nowhere);
-        Ok(())
+        let appended = self.shared[&primitive.attributes].clone();
+        self.append_triangles(primitive, &triangles, &appended, document)
     }
 
     fn read_vertices(
@@ -192,8 +212,7 @@ impl Joiner<'_> {
         }
     }
 
-    /// Returns the index of the first of them, and which of them are nowhere.
-    fn append_vertices(&mut self, vertices: Vertices) -> (u32, Vec<u32>) {
+    fn append_vertices(&mut self, vertices: Vertices) -> Shared {
         let mesh = &mut self.mesh;
         let first = mesh.positions.len();
         mesh.positions.extend(vertices.positions);
@@ -210,29 +229,67 @@ impl Joiner<'_> {
             extend(&mut target.normals, more.normals, Vec3::ZERO, first, all);
             extend(&mut target.colors, more.colors, Vec4::ZERO, first, all);
         }
-        (first as u32, vertices.nowhere)
+        let tangents = vertices.tangents.map(Rc::new);
+        Shared { first: first as u32, nowhere: Rc::new(vertices.nowhere), tangents }
     }
 
     fn append_triangles(
         &mut self,
         primitive: &Primitive<'_>,
         triangles: &[[u32; 3]],
-        first_vertex: u32,
-        nowhere: &[u32],
-    ) {
-        let is_somewhere = |corner: &u32| nowhere.binary_search(corner).is_err();
-        let drawn = triangles
+        vertices: &Shared,
+        document: &mut Document<'_>,
+    ) -> Result<(), Fault> {
+        let is_somewhere = |corner: &u32| vertices.nowhere.binary_search(corner).is_err();
+        let drawn: Vec<[u32; 3]> = triangles
             .iter()
-            .filter(|triangle| nowhere.is_empty() || triangle.iter().all(is_somewhere));
-        let drawn = drawn.map(|triangle| triangle.map(|corner| corner + first_vertex));
+            .filter(|triangle| vertices.nowhere.is_empty() || triangle.iter().all(is_somewhere))
+            .copied()
+            .collect();
+        self.append_tangents(primitive, &drawn, vertices, document)?;
+        let drawn = drawn.iter().map(|triangle| triangle.map(|corner| corner + vertices.first));
         self.mesh.triangles.extend(drawn);
         let count = self.mesh.triangles.len();
         self.mesh.triangle_materials.resize(count, primitive.material_slot);
+        Ok(())
+    }
+
+    /// Of triangles that are about to be appended, if they have a normal map. What deforms has none: its axes are taken from where the
+    /// triangle is by then.
+    fn append_tangents(
+        &mut self,
+        primitive: &Primitive<'_>,
+        triangles: &[[u32; 3]],
+        vertices: &Shared,
+        document: &mut Document<'_>,
+    ) -> Result<(), Fault> {
+        let deforms = !self.mesh.targets.is_empty() || !self.mesh.influences.is_empty();
+        let map = primitive.normal_map.filter(|_| self.shaded_smoothly && !deforms);
+        let before = 3 * self.mesh.triangles.len();
+        let tangents = match (map, &vertices.tangents) {
+            (None, _) => None,
+            (Some(map), file) => {
+                let pointer = primitive.json.pointer();
+                document.budget.allocate(pointer, 3 * triangles.len(), size_of::<Vec4>())?;
+                Some(match file {
+                    Some(tangents) => tangents::from_file(tangents, triangles),
+                    None => {
+                        let place =
+                            |triangle: &[u32; 3]| triangle.map(|corner| corner + vertices.first);
+                        let placed: Vec<[u32; 3]> = triangles.iter().map(place).collect();
+                        tangents::generate(&self.mesh, &placed, &map)
+                    }
+                })
+            }
+        };
+        let all = before + 3 * triangles.len();
+        extend(&mut self.mesh.tangents, tangents, tangents::UNKNOWN, before, all);
+        Ok(())
     }
 }
 
-/// Position, normal, two texture coordinates, colour.
-const BYTES_PER_VERTEX: usize = 12 + 12 + 2 * 8 + 16;
+/// Position, normal, texture coordinates, colour.
+const BYTES_PER_VERTEX: usize = 12 + 12 + UV_SETS * 8 + 16;
 
 /// Appends `more` to `values` so that it is `all` long, unless it stays empty; vertices without a value get `filler`.
 pub(super) fn extend<T: Copy>(

@@ -10,9 +10,10 @@
 //! | `.glb`, `.gltf`, `data:` URIs, files in its folder, EXT_meshopt_compression | images that cannot be decoded: a checker | GLB chunks of other types | other versions than 2.x, required extensions that are unknown |
 //! | triangles, strips, fans; indexed or not; normalised, quantised, sparse | joint weights that do not sum to 1: scaled; skins with joints elsewhere: rest shape | points, lines | indices and references that lead nowhere |
 //! | nodes with TRS or matrix, one scene, EXT_mesh_gpu_instancing | sheared matrices: without shear | other scenes | loops, two parents |
-//! | base colour, metallic, roughness, emissive (KHR_materials_emissive_strength), COLOR_0, TEXCOORD_0 and 1, EXT_texture_webp | metallic-roughness and emissive textures: their mean; BLEND, MASK: opaque; unlit: lit | normal and occlusion textures, texture transforms, other extensions | paths out of the folder |
+//! | all of a material with its textures, KHR_texture_transform, EXT_texture_webp, COLOR_0, TEXCOORD_0 to 3, TANGENT | | textures by TEXCOORD_4 and beyond | paths out of the folder |
+//! | KHR_materials_emissive_strength, _unlit, _ior, _specular, _transmission, _volume, _clearcoat, _sheen | thickness textures: volumes are as thick as they are modelled | other extensions | |
 //! | cameras, KHR_lights_punctual | none in the file: added, with a note | | angles out of range |
-//! | skins with any number of joints, morph targets (position, normal, colour) | | morphed texture coordinates and tangents | joints and weights that do not match in number |
+//! | skins with any number of joints, morph targets (position, normal, colour) | tangents of what deforms: from its texture coordinates | morphed texture coordinates and tangents | joints and weights that do not match in number |
 //! | TRS and weights animation, all interpolations, all animations at once or the first | unusable keys: without them | pointers, what is driven twice | keys and values that do not match in number |
 
 mod accessor;
@@ -31,6 +32,7 @@ mod image;
 mod influences;
 mod instances;
 mod json;
+mod layers;
 mod light;
 mod limits;
 mod load;
@@ -39,6 +41,7 @@ mod mesh;
 mod node;
 mod normals;
 mod skin;
+mod tangents;
 mod texture;
 mod topology;
 mod uri;
@@ -48,3 +51,8 @@ pub use choice::{AnimationChoice, Choice, Pick};
 pub use error::{LoadError, Place, Problem};
 pub use limits::Limits;
 pub use load::{load, load_bytes, load_chosen};
+
+pub(crate) use defaults::NO_LIGHT;
+pub(crate) use error::one_line;
+pub(crate) use limits::check_environment_size;
+pub(crate) use load::read_whole;

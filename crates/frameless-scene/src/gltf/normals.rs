@@ -28,6 +28,8 @@ pub(super) fn flatten(vertices: &Vertices, triangles: &mut [[u32; 3]]) -> Vertic
         positions: pick(&vertices.positions, &corners),
         normals,
         uvs: vertices.uvs.each_ref().map(|uvs| uvs.as_ref().map(|uvs| pick(uvs, &corners))),
+        // Those of the file belong to normals that it does not have (glTF 2.0 §3.7.2.1).
+        tangents: None,
         colors: vertices.colors.as_ref().map(|colors| pick(colors, &corners)),
         influences: vertices.influences.iter().map(|set| pick_influences(set, &corners)).collect(),
         targets: vertices.targets.iter().map(|target| pick_target(target, &corners)).collect(),

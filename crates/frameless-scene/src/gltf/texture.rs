@@ -2,9 +2,9 @@
 
 use std::collections::HashMap;
 
-use glam::DVec4;
+use glam::Vec2;
 
-use crate::{Filter, Image, Texture, TextureRef, Wrap};
+use crate::{Filter, Image, Minify, Texture, TextureRef, UV_SETS, Wrap};
 
 use super::document::Document;
 use super::error::Fault;
@@ -25,8 +25,15 @@ pub(super) struct Textures<'a> {
 #[derive(Clone, Copy)]
 struct FileTexture {
     image: Option<usize>,
+    sampler: Sampler,
+}
+
+/// How a picture is looked up.
+#[derive(Clone, Copy)]
+struct Sampler {
     wrap: [Wrap; 2],
     filter: Filter,
+    minify: Minify,
 }
 
 impl<'a> Textures<'a> {
@@ -49,48 +56,50 @@ impl<'a> Textures<'a> {
         })
     }
 
-    /// The texture that a material refers to with `info`; `owner` is the material's.
+    /// The texture that the member `key` of `holder` refers to, if it is there; `owner` is the material's.
     pub(super) fn refer(
         &mut self,
-        info: &Json<'_>,
+        holder: &Json<'_>,
+        key: &str,
         owner: &str,
         document: &mut Document<'_>,
     ) -> Result<Option<TextureRef>, Fault> {
-        let file_texture = self.check(info)?;
-        if info.extension("KHR_texture_transform")?.is_some() {
-            document.warnings.about("texture transforms are not applied", owner);
+        let Some(info) = holder.field(key)? else { return Ok(None) };
+        let file_texture = self.check(&info)?;
+        let mut uv_set = info.unsigned_or("texCoord", 0)?;
+        let mut reference = TextureRef::plain(0);
+        if let Some(transform) = info.extension("KHR_texture_transform")? {
+            uv_set = transform.unsigned_or("texCoord", uv_set)?;
+            let offset = transform.numbers_or("offset", [0.0; 2])?;
+            let scale = transform.numbers_or("scale", [1.0; 2])?;
+            let rotation_rad = transform.number_or("rotation", 0.0)?;
+            let [offset, scale] = [offset, scale].map(Vec2::from_array);
+            reference.picture_from_uv = TextureRef::transform(offset, rotation_rad, scale);
         }
-        let uv_set = info.unsigned_or("texCoord", 0)?;
-        if uv_set > 1 {
-            let what = "textures with texture coordinates beyond set 1 are not drawn";
+        if uv_set >= UV_SETS {
+            let what = "textures with texture coordinates beyond set 3 are not drawn";
             document.warnings.about(what, owner);
             return Ok(None);
         }
         let texture = self.texture(file_texture, document);
-        Ok(texture.map(|texture| TextureRef { texture, uv_set: uv_set as u32 }))
+        Ok(texture.map(|texture| TextureRef { texture, uv_set: uv_set as u32, ..reference }))
     }
 
     /// Refuses an `info` that refers to no texture; returns the index of the file's texture.
-    pub(super) fn check(&self, info: &Json<'_>) -> Result<usize, Fault> {
+    fn check(&self, info: &Json<'_>) -> Result<usize, Fault> {
         info.required("index")?.index(self.file_textures.len(), "textures")
     }
 
-    /// The mean of the texture that `info` refers to, with RGB made linear.
-    pub(super) fn mean(
-        &self,
-        info: &Json<'_>,
-        decode_srgb: bool,
-        document: &mut Document<'_>,
-    ) -> Result<Option<DVec4>, Fault> {
-        let image = self.file_textures[self.check(info)?].image;
-        Ok(image.and_then(|image| self.file_images[image].mean(decode_srgb, document)))
+    /// Refuses a member that refers to no texture, of those that are not drawn.
+    pub(super) fn check_member(&self, holder: &Json<'_>, key: &str) -> Result<(), Fault> {
+        holder.field(key)?.map_or(Ok(()), |info| self.check(&info).map(drop))
     }
 
     fn texture(&mut self, file_texture: usize, document: &mut Document<'_>) -> Option<u32> {
         if let Some(&known) = self.texture_of.get(&file_texture) {
             return Some(known);
         }
-        let FileTexture { image, wrap, filter } = self.file_textures[file_texture];
+        let FileTexture { image, sampler } = self.file_textures[file_texture];
         let Some(image) = image else {
             let whom = format!("/textures/{file_texture}");
             document.warnings.about("textures without a readable image are not drawn", whom);
@@ -98,7 +107,8 @@ impl<'a> Textures<'a> {
         };
         let image = self.image(image, document);
         let index = self.textures.len() as u32;
-        self.textures.push(Texture { image, wrap, filter });
+        let Sampler { wrap, filter, minify } = sampler;
+        self.textures.push(Texture { image, wrap, filter, minify });
         self.texture_of.insert(file_texture, index);
         Some(index)
     }
@@ -117,12 +127,16 @@ impl<'a> Textures<'a> {
 impl FileTexture {
     fn parse(
         json: &Json<'_>,
-        samplers: &[([Wrap; 2], Filter)],
+        samplers: &[Sampler],
         image_count: usize,
     ) -> Result<FileTexture, Fault> {
-        let (wrap, filter) = match json.field("sampler")? {
+        let sampler = match json.field("sampler")? {
             Some(sampler) => samplers[sampler.index(samplers.len(), "samplers")?],
-            None => Default::default(),
+            None => Sampler {
+                wrap: [Wrap::Repeat; 2],
+                filter: Filter::Linear,
+                minify: Minify::TRILINEAR,
+            },
         };
         let mut image = None;
         let webp = json.extension("EXT_texture_webp")?;
@@ -132,11 +146,12 @@ impl FileTexture {
                 image = image.or(Some(source));
             }
         }
-        Ok(FileTexture { image, wrap, filter })
+        Ok(FileTexture { image, sampler })
     }
 }
 
-fn parse_sampler(json: &Json<'_>) -> Result<([Wrap; 2], Filter), Fault> {
+fn parse_sampler(json: &Json<'_>) -> Result<Sampler, Fault> {
+    let wrap = [parse_wrap(json, "wrapS")?, parse_wrap(json, "wrapT")?];
     let filter = match json.field("magFilter")? {
         None => Filter::default(),
         Some(filter) => match filter.unsigned()? {
@@ -145,7 +160,23 @@ fn parse_sampler(json: &Json<'_>) -> Result<([Wrap; 2], Filter), Fault> {
             _ => return Err(filter.fault("a filter: 9728 or 9729")),
         },
     };
-    Ok(([parse_wrap(json, "wrapS")?, parse_wrap(json, "wrapT")?], filter))
+    Ok(Sampler { wrap, filter, minify: parse_minify(json)? })
+}
+
+/// Names: how between texels, and how between levels (glTF 2.0 §3.8.4.1, with OpenGL's numbers).
+fn parse_minify(json: &Json<'_>) -> Result<Minify, Fault> {
+    use Filter::{Linear, Nearest};
+    let Some(filter) = json.field("minFilter")? else { return Ok(Minify::TRILINEAR) };
+    let (filter, levels) = match filter.unsigned()? {
+        9728 => (Nearest, None),
+        9729 => (Linear, None),
+        9984 => (Nearest, Some(Nearest)),
+        9985 => (Linear, Some(Nearest)),
+        9986 => (Nearest, Some(Linear)),
+        9987 => (Linear, Some(Linear)),
+        _ => return Err(filter.fault("a filter: 9728, 9729, or 9984 to 9987")),
+    };
+    Ok(Minify { filter, levels })
 }
 
 fn parse_wrap(json: &Json<'_>, key: &str) -> Result<Wrap, Fault> {

@@ -1,7 +1,9 @@
 //! Materials, textures, images and extensions.
 
-use frameless_scene::{Filter, Limits, Scene, TextureRef, Wrap, load_bytes};
-use glam::{Vec3, Vec4};
+use frameless_scene::{
+    AlphaMode, Environment, Filter, Limits, Minify, Scene, TextureRef, Wrap, load_bytes,
+};
+use glam::{Vec2, Vec3, Vec4};
 use serde_json::{Value, json};
 
 use super::maker::{Maker, SQUARE, png, rich};
@@ -60,35 +62,146 @@ fn factors_out_of_range_are_moved_aloud() {
 fn textures_are_decoded_with_their_sampler() {
     let scene = rich().load();
     let texture = scene.materials[0].base_color_texture;
-    assert_eq!(texture, Some(TextureRef { texture: 0, uv_set: 0 }));
+    assert_eq!(texture, Some(TextureRef::plain(0)));
     assert_eq!(scene.textures[0].filter, Filter::Nearest);
+    assert_eq!(scene.textures[0].minify, Minify::TRILINEAR);
     assert_eq!(scene.textures[0].wrap, [Wrap::ClampToEdge, Wrap::MirroredRepeat]);
     assert_eq!((scene.images[0].width, scene.images[0].height), (2, 2));
     assert_eq!(scene.images[0].rgba, [[255, 128, 0, 255]; 4]);
     assert_eq!(scene.images.len(), 1, "one image, however many textures show it");
 }
 
-/// The mean of (255, 128, 0): roughness is green, metalness blue, and light is linear.
 #[test]
-fn textures_that_are_not_drawn_count_by_their_mean() {
-    let material = &rich().load().materials[0];
-    assert!((material.roughness - 0.25 * 128.0 / 255.0).abs() < 1e-6);
-    assert_eq!(material.metallic, 0.0);
+fn all_textures_of_a_material_are_kept_with_their_factors() {
+    let scene = rich().load();
+    let material = &scene.materials[0];
+    assert_eq!((material.roughness, material.metallic), (0.25, 0.5));
+    assert_eq!(material.metallic_roughness_texture, Some(TextureRef::plain(1)));
     assert_eq!(material.emissive, Vec3::new(0.5 * 2.0, 0.0, 0.0));
+    assert_eq!(material.emissive_texture, Some(TextureRef::plain(0)));
+    assert_eq!(material.normal_texture, Some((TextureRef::plain(1), 1.0)));
+    assert_eq!(material.alpha_mode, AlphaMode::Mask { cutoff: 0.5 });
+    assert!(scene.warnings.is_empty(), "{:#?}", scene.warnings);
 }
 
 #[test]
-fn what_is_not_drawn_is_warned_of_by_name() {
-    let scene = rich().load();
-    for of in [
-        "normal textures are not drawn: material \"paint\"",
-        "alpha mode MASK is drawn opaque: material \"paint\"",
-        "metallic-roughness textures are replaced by their mean: material \"paint\"",
-        "emissive textures are replaced by their mean: material \"paint\"",
-    ] {
-        assert!(scene.warnings.iter().any(|warning| warning == of), "{of}: {:#?}", scene.warnings);
+fn minification_filters_are_told_apart() {
+    use Filter::{Linear, Nearest};
+    let expected = [
+        (json!(null), Some((Linear, Some(Linear)))),
+        (json!(9728), Some((Nearest, None))),
+        (json!(9729), Some((Linear, None))),
+        (json!(9984), Some((Nearest, Some(Nearest)))),
+        (json!(9985), Some((Linear, Some(Nearest)))),
+        (json!(9986), Some((Nearest, Some(Linear)))),
+        (json!(9987), Some((Linear, Some(Linear)))),
+        (json!(9988), None),
+    ];
+    for (number, expected) in expected {
+        let mut maker = with_image(&png(1, 1));
+        let sampler = if number.is_null() { json!({}) } else { json!({"minFilter": number}) };
+        maker.push("samplers", sampler);
+        maker.json["textures"][0]["sampler"] = json!(0);
+        match (maker.try_load(), expected) {
+            (Ok(scene), Some((filter, levels))) => {
+                assert_eq!(scene.textures[0].minify, Minify { filter, levels });
+            }
+            (Err(error), None) => assert!(error.to_string().contains("/samplers/0/minFilter")),
+            (result, _) => panic!("{number}: {result:?}"),
+        }
     }
-    assert_eq!(scene.warnings.len(), 4, "{:#?}", scene.warnings);
+}
+
+#[test]
+fn a_texture_transform_may_name_another_set() {
+    let mut maker = with_image(&png(1, 1));
+    let transform = json!({"offset": [0.5, 0.25], "scale": [2.0, 3.0], "texCoord": 3});
+    let info = json!({"index": 0, "texCoord": 1,
+        "extensions": {"KHR_texture_transform": transform}});
+    maker.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = info;
+    let reference = maker.load().materials[0].base_color_texture.unwrap();
+    assert_eq!(reference.uv_set, 3);
+    let moved = reference.picture_from_uv.transform_point2(Vec2::ONE);
+    assert_eq!(moved, Vec2::new(2.5, 3.25));
+    let info = &mut maker.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"];
+    info["extensions"]["KHR_texture_transform"]["texCoord"] = json!(4);
+    let scene = maker.load();
+    assert!(scene.materials[0].base_color_texture.is_none());
+    assert!(warns(&scene, "beyond set 3"));
+}
+
+fn with_extensions(extensions: Value) -> Scene {
+    with_material(json!({"name": "layered", "extensions": extensions})).load()
+}
+
+#[test]
+fn extensions_of_materials_are_read() {
+    let scene = with_extensions(json!({
+        "KHR_materials_unlit": {},
+        "KHR_materials_ior": {"ior": 1.33},
+        "KHR_materials_specular": {"specularFactor": 0.5, "specularColorFactor": [1.0, 2.0, 0.0]},
+        "KHR_materials_transmission": {"transmissionFactor": 0.75},
+        "KHR_materials_volume": {"thicknessFactor": 0.1, "attenuationDistance": 2.0,
+            "attenuationColor": [1.0, 0.5, 0.25]},
+        "KHR_materials_clearcoat": {"clearcoatFactor": 1.0, "clearcoatRoughnessFactor": 0.125},
+        "KHR_materials_sheen": {"sheenColorFactor": [0.5, 0.0, 1.0], "sheenRoughnessFactor": 0.3}}));
+    assert_eq!(scene.warnings, ["the file has nothing to draw"]);
+    let material = &scene.materials[0];
+    assert!(material.unlit && material.specular == 0.5);
+    let layers = material.layers.as_ref().unwrap();
+    assert_eq!((layers.ior, layers.transmission), (1.33, 0.75));
+    assert_eq!(layers.specular_color, Vec3::new(1.0, 2.0, 0.0));
+    let sigma = layers.volume.unwrap().absorption_per_m;
+    let after_2_m = Vec3::from_array((-2.0 * sigma).to_array().map(f32::exp));
+    assert!(after_2_m.abs_diff_eq(Vec3::new(1.0, 0.5, 0.25), 1e-6), "{after_2_m}");
+    assert_eq!((layers.clearcoat, layers.clearcoat_roughness), (1.0, 0.125));
+    assert_eq!((layers.sheen_color, layers.sheen_roughness), (Vec3::new(0.5, 0.0, 1.0), 0.3));
+}
+
+#[test]
+fn absurd_layers_are_settled_aloud() {
+    let ior = |ior: f32| {
+        let scene = with_extensions(json!({"KHR_materials_ior": {"ior": ior}}));
+        let said = warns(&scene, "refractive indices below 1");
+        (scene.materials[0].layers.as_ref().map(|layers| layers.ior), said)
+    };
+    assert_eq!(ior(0.0), (Some(f32::INFINITY), false));
+    assert_eq!(ior(0.5), (Some(1.0), true));
+    assert_eq!(ior(-3.0), (Some(1.0), true));
+    assert_eq!(ior(1.5), (None, false));
+    let volume = json!({"thicknessFactor": 1.0, "attenuationDistance": 0.0});
+    let scene = with_extensions(json!({"KHR_materials_volume": volume}));
+    assert!(warns(&scene, "attenuate nothing"));
+    let color = json!({"specularColorFactor": [-1.0, 0.0, 0.0]});
+    assert!(warns(&with_extensions(json!({"KHR_materials_specular": color})), "negative colours"));
+    let mut maker = with_material(json!({"alphaMode": "MASK", "alphaCutoff": 1e39}));
+    assert!(maker.refusal().contains("/materials/0/alphaCutoff: wanted a 32-bit number"));
+    maker.json["materials"][0] = json!({"alphaMode": "GLASS"});
+    assert!(maker.refusal().contains("wanted OPAQUE, MASK or BLEND"));
+}
+
+#[test]
+fn an_environment_takes_the_place_of_light_that_was_added() {
+    let mut scene = Maker::with_primitive(
+        |maker| json!({"attributes": {"POSITION": maker.floats("VEC3", &SQUARE)}}),
+    )
+    .load();
+    assert!(scene.has_added_light && scene.lights.len() == 1);
+    let texels = std::sync::Arc::new(vec![[1.0; 3]; 2]);
+    let environment = Environment {
+        name: "two.hdr".to_owned(),
+        width: 2,
+        height: 1,
+        texels,
+        rotation_rad: 0.0,
+        strength: 1.0,
+    };
+    scene.light_by(environment.clone());
+    assert!(scene.lights.is_empty() && scene.ambient == Vec3::ZERO);
+    assert!(!scene.notes.iter().any(|note| note.contains("added a key light")));
+    scene.check().unwrap();
+    scene.environment = Some(Environment { height: 2, ..environment });
+    assert!(scene.check().is_err());
 }
 
 #[test]
@@ -148,12 +261,13 @@ fn required_extensions_are_supported_or_refused_by_name() {
 
 #[test]
 fn optional_extensions_are_ignored_aloud_declared_or_not() {
-    let mut maker = with_material(json!({"extensions": {"KHR_materials_sheen": {}}}));
-    maker.json["extensionsUsed"] = json!(["KHR_materials_clearcoat", "KHR_materials_unlit"]);
+    let mut maker = with_material(json!({"extensions": {"KHR_materials_iridescence": {}}}));
+    maker.json["extensionsUsed"] = json!(["KHR_materials_anisotropy", "KHR_materials_unlit"]);
     maker.json["extras"] = json!({"extensions": {"not_an_extension": {}}});
     let scene = maker.load();
     assert!(
-        warns(&scene, "\"KHR_materials_sheen\"") && warns(&scene, "\"KHR_materials_clearcoat\"")
+        warns(&scene, "\"KHR_materials_iridescence\"")
+            && warns(&scene, "\"KHR_materials_anisotropy\"")
     );
     assert!(!warns(&scene, "not_an_extension") && !warns(&scene, "unlit"));
 }

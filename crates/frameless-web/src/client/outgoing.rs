@@ -13,7 +13,7 @@ const FIRST_GUESS: [f64; 2] = [130.0, 350.0];
 /// Of the newest message in what a tile is expected to take.
 const LEARNING_RATE: f64 = 0.2;
 /// While something moves, so much is refined per byte that is sent of what moves.
-const REFINE_SHARE: f64 = 0.06;
+const REFINE_SHARE: f64 = 0.04;
 /// The largest message in bytes while something moves: what moved most is on the page while the rest of the picture is still being
 /// encoded, and waits for no large refinement.
 const LARGEST_MOVING: usize = 16 << 10;
@@ -167,7 +167,12 @@ mod tests {
         };
         let rgba = (0..size.pixels()).map(|_| [byte(), byte(), byte(), 255]).collect();
         let now = Instant::now();
-        published(Publisher::new(now).take(picture(size, rgba), Vec::new(), false, now))
+        published(Publisher::new(now).take(
+            picture(size, rgba),
+            Vec::new(),
+            crate::tiles::Occasion::Motion,
+            now,
+        ))
     }
 
     #[test]

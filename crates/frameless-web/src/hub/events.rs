@@ -1,7 +1,7 @@
 //! What the hub is told, and what it tells everybody.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use frameless_session::Status;
@@ -87,6 +87,8 @@ pub(crate) struct HubHandle {
     pub(super) painted: Arc<AtomicU64>,
     // Bytes of what moves in one picture: the most that a client has been sent since then.
     pub(super) moved_bytes: Arc<AtomicU64>,
+    // The number of the last picture that a client has drawn, every bit of it.
+    pub(super) drawn: Arc<AtomicU32>,
     // Those who want pictures and are no clients.
     pub(super) lookers: Arc<AtomicUsize>,
 }
@@ -112,6 +114,11 @@ impl HubHandle {
         // Where the inbox is full the hub is awake.
         self.events.try_send(Event::Woken).ok();
         Looking(Arc::clone(&self.lookers))
+    }
+
+    /// A client has drawn all of a picture.
+    pub(crate) fn drawn(&self, number: u32) {
+        self.drawn.fetch_max(number, Ordering::Relaxed);
     }
 
     /// A client is being sent so many bytes of what moves in one picture.

@@ -14,7 +14,7 @@ pub(crate) use atlas::Atlas;
 pub(crate) use codec::encode;
 pub(crate) use flow::Flow;
 pub(crate) use grid::{Grid, SIDE};
-pub(crate) use publish::{Published, Publisher, Taken};
+pub(crate) use publish::{Occasion, Published, Publisher, Taken};
 pub(crate) use seen::{Seen, Times};
 use smooth::Mean;
 

@@ -1,7 +1,8 @@
 //! Pictures as the clients see them: only those in which something changed, with what changed in them.
 //!
 //! What rests is refined for seconds by differences that nobody sees. Were each of those pictures published, no client would ever have
-//! *the* picture: so a picture in which no change can be seen is published only twice a second, or once it is the same twice.
+//! *the* picture: so a picture in which no change can be seen is published only twice a second, or once it is the same twice. And where
+//! nothing moves, what has been published is first to be drawn by a client, every bit of it; only then comes something better.
 
 use std::hash::{BuildHasher, Hasher};
 use std::sync::{Arc, OnceLock};
@@ -18,6 +19,8 @@ use super::{Grid, Mean};
 const SEEN: f64 = 1.0;
 /// What nobody sees is published this often.
 const UNSEEN_INTERVAL: Duration = Duration::from_millis(500);
+/// What is only refined waits for clients no longer than this.
+const REFINED_AT_LATEST: Duration = Duration::from_secs(2);
 /// Without a change that is seen for so long the picture is calm.
 const CALM: Duration = Duration::from_millis(120);
 
@@ -70,6 +73,17 @@ impl Published {
     }
 }
 
+/// Why a picture differs from the last one, if it does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Occasion {
+    /// It is the first one that shows an input.
+    Input,
+    /// Something may have moved.
+    Motion,
+    /// Nothing moves: more samples have been added up. `is_drawn`: nobody is still waiting for parts of the last one.
+    Refinement { is_drawn: bool },
+}
+
 /// What became of a picture.
 pub(crate) enum Taken {
     /// It is to be shown.
@@ -103,12 +117,18 @@ impl Publisher {
         now.saturating_duration_since(self.seen_at)
     }
 
-    /// Compares the picture with the last one that was published. With `new_input` it is published in any case if anything differs.
+    /// The number of the last picture that was published; 0: none.
+    pub(crate) fn last_number(&self) -> u32 {
+        self.last.as_ref().map_or(0, |last| last.number)
+    }
+
+    /// Compares the picture with the last one that was published. The first one that shows an input is published in any case if anything
+    /// differs.
     pub(crate) fn take(
         &mut self,
         picture: Picture,
         inputs: Vec<(u32, u32)>,
-        new_input: bool,
+        occasion: Occasion,
         now: Instant,
     ) -> Taken {
         self.taken_at = now;
@@ -131,11 +151,19 @@ impl Publisher {
             .iter()
             .enumerate()
             .any(|(tile, &sum)| sum as f64 >= SEEN * f64::from(grid.pixels(tile)));
-        if is_seen {
+        let age = now.duration_since(self.published_at);
+        let is_worth_it = is_seen || stands_still || age >= UNSEEN_INTERVAL;
+        let is_due = match occasion {
+            Occasion::Input => true,
+            Occasion::Motion => is_worth_it,
+            Occasion::Refinement { is_drawn } => {
+                is_worth_it && (is_drawn || age >= REFINED_AT_LATEST)
+            }
+        };
+        if is_seen && !matches!(occasion, Occasion::Refinement { .. }) {
             self.seen_at = now;
         }
-        let due = now.duration_since(self.published_at) >= UNSEEN_INTERVAL;
-        if !(is_seen || differs && (due || new_input || stands_still)) {
+        if !(differs && is_due) {
             return Taken::Same(picture.rgba);
         }
         let (mut digests, mut change_sums) = (last.digests.clone(), last.change_sums.clone());
@@ -254,10 +282,10 @@ pub(crate) mod tests {
     fn what_is_seen_is_published_at_once_and_the_same_never() {
         let now = Instant::now();
         let mut publisher = Publisher::new(now);
-        let first = published(publisher.take(grey(10), Vec::new(), false, now));
+        let first = published(publisher.take(grey(10), Vec::new(), Occasion::Motion, now));
         let mut other = grey(10);
         other.rgba[5][0] = 90;
-        let second = published(publisher.take(other, Vec::new(), false, now));
+        let second = published(publisher.take(other, Vec::new(), Occasion::Motion, now));
         assert!(second.number > first.number);
         assert_ne!(second.digests[0], first.digests[0]);
         assert_eq!(second.digests[1..], first.digests[1..]);
@@ -265,14 +293,14 @@ pub(crate) mod tests {
         let mut same = grey(10);
         same.rgba[5][0] = 90;
         let later = now + Duration::from_secs(60);
-        assert!(matches!(publisher.take(same, Vec::new(), true, later), Taken::Same(_)));
+        assert!(matches!(publisher.take(same, Vec::new(), Occasion::Input, later), Taken::Same(_)));
     }
 
     #[test]
     fn what_nobody_sees_waits_half_a_second_and_still_comes() {
         let now = Instant::now();
         let mut publisher = Publisher::new(now);
-        published(publisher.take(grey(10), Vec::new(), false, now));
+        published(publisher.take(grey(10), Vec::new(), Occasion::Motion, now));
         let one_step = || {
             let mut picture = grey(10);
             picture.rgba[7] = [11, 10, 10, 255];
@@ -284,8 +312,11 @@ pub(crate) mod tests {
             picture
         };
         let at = |ms| now + Duration::from_millis(ms);
-        assert!(matches!(publisher.take(one_step(), Vec::new(), false, at(100)), Taken::Same(_)));
-        let shown = published(publisher.take(other_step(), Vec::new(), false, at(510)));
+        assert!(matches!(
+            publisher.take(one_step(), Vec::new(), Occasion::Motion, at(100)),
+            Taken::Same(_)
+        ));
+        let shown = published(publisher.take(other_step(), Vec::new(), Occasion::Motion, at(510)));
         assert!(shown.calm_at <= at(510));
     }
 
@@ -293,11 +324,11 @@ pub(crate) mod tests {
     fn what_stands_still_is_published_at_once() {
         let now = Instant::now();
         let mut publisher = Publisher::new(now);
-        published(publisher.take(grey(10), Vec::new(), false, now));
+        published(publisher.take(grey(10), Vec::new(), Occasion::Motion, now));
         let mut one_step = || {
             let mut picture = grey(10);
             picture.rgba[7] = [11, 10, 10, 255];
-            publisher.take(picture, Vec::new(), false, now)
+            publisher.take(picture, Vec::new(), Occasion::Motion, now)
         };
         assert!(matches!(one_step(), Taken::Same(_)));
         published(one_step());
@@ -305,21 +336,43 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn what_is_refined_waits_until_the_last_picture_is_drawn() {
+        let now = Instant::now();
+        let mut publisher = Publisher::new(now);
+        published(publisher.take(grey(10), Vec::new(), Occasion::Motion, now));
+        let mut refined = |level, is_drawn, ms| {
+            let at = now + Duration::from_millis(ms);
+            publisher.take(grey(level), Vec::new(), Occasion::Refinement { is_drawn }, at)
+        };
+        assert!(matches!(refined(20, false, 100), Taken::Same(_)));
+        assert!(matches!(refined(30, false, 600), Taken::Same(_)));
+        let second = published(refined(40, true, 700));
+        assert!(
+            second.calm_at < now + Duration::from_millis(700),
+            "nothing moves: exactly at once"
+        );
+        assert!(matches!(refined(50, false, 2600), Taken::Same(_)));
+        published(refined(60, false, 2700));
+    }
+
+    #[test]
     fn a_slow_fade_is_seen_before_half_a_second() {
         let now = Instant::now();
         let mut publisher = Publisher::new(now);
-        published(publisher.take(grey(10), Vec::new(), false, now));
+        published(publisher.take(grey(10), Vec::new(), Occasion::Motion, now));
         // One step in each channel: 3 ≥ SEEN.
-        assert!(published(publisher.take(grey(11), Vec::new(), false, now)).calm_at > now);
+        assert!(
+            published(publisher.take(grey(11), Vec::new(), Occasion::Motion, now)).calm_at > now
+        );
     }
 
     #[test]
     fn another_size_is_another_generation() {
         let now = Instant::now();
         let mut publisher = Publisher::new(now);
-        let first = published(publisher.take(grey(10), Vec::new(), false, now));
+        let first = published(publisher.take(grey(10), Vec::new(), Occasion::Motion, now));
         let small = picture(Size::new(1, 1), vec![[0, 0, 0, 255]]);
-        let second = published(publisher.take(small, Vec::new(), false, now));
+        let second = published(publisher.take(small, Vec::new(), Occasion::Motion, now));
         assert!(second.generation > first.generation && second.number > first.number);
         assert_eq!(second.digests.len(), 1);
     }
@@ -330,7 +383,7 @@ pub(crate) mod tests {
         // "123456789", whose CRC-32 is known.
         let rgba = vec![*b"123\xff", *b"456\xff", *b"789\xff"];
         let three = picture(Size::new(1, 3), rgba);
-        let shown = published(Publisher::new(now).take(three, Vec::new(), false, now));
+        let shown = published(Publisher::new(now).take(three, Vec::new(), Occasion::Motion, now));
         assert_eq!(shown.crc(), 0xcbf4_3926);
     }
 }

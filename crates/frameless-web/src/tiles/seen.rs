@@ -205,7 +205,7 @@ mod tests {
     use frameless::Size;
 
     use super::*;
-    use crate::tiles::{Publisher, SIDE, picture, published};
+    use crate::tiles::{Occasion, Publisher, SIDE, picture, published};
 
     const SIZE: Size = Size { width: 4 * SIDE, height: SIDE };
     const PLENTY: [usize; 2] = [100, 100];
@@ -237,7 +237,7 @@ mod tests {
             published(self.publisher.take(
                 picture(SIZE, self.rgba.clone()),
                 Vec::new(),
-                true,
+                Occasion::Input,
                 self.now,
             ))
         }
@@ -362,7 +362,8 @@ mod tests {
         let mut seen = exact_everywhere(&mut scene);
         let smaller = Size::new(SIDE + 1, 3);
         let rgba = vec![[1, 2, 3, 255]; smaller.pixels()];
-        let taken = scene.publisher.take(picture(smaller, rgba), Vec::new(), false, scene.now);
+        let taken =
+            scene.publisher.take(picture(smaller, rgba), Vec::new(), Occasion::Motion, scene.now);
         let chosen = seen.choose(&published(taken), at(1000), PLENTY, false);
         assert_eq!(chosen.tiles, [0, 1]);
     }
@@ -372,7 +373,7 @@ mod tests {
         let size = Size::new(3840, 2160);
         let now = Instant::now();
         let black = picture(size, vec![[0, 0, 0, 255]; size.pixels()]);
-        let shown = published(Publisher::new(now).take(black, Vec::new(), false, now));
+        let shown = published(Publisher::new(now).take(black, Vec::new(), Occasion::Motion, now));
         let mut seen = Seen::nothing();
         assert_eq!(seen.choose(&shown, at(1), [usize::MAX; 2], true).tiles.len(), MOST_TILES);
         assert_eq!(size_of::<Tile>(), 56);

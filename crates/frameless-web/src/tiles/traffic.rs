@@ -8,7 +8,7 @@ use frameless_scene::builtin;
 use frameless_session::{Session, Settings};
 use frameless_trace::{CpuTracer, ViewSource, World};
 
-use super::{Atlas, Publisher, Seen, Taken, Times, encode};
+use super::{Atlas, Occasion, Publisher, Seen, Taken, Times, encode};
 use crate::wire::Codec;
 
 const SIZE: Size = Size { width: 512, height: 384 };
@@ -39,7 +39,7 @@ fn measure(scene: &str, pictures_per_sec: u32, from_secs: f64, secs: f64) -> Mea
             session.step().expect("finite colours");
         }
         let now = begin + Duration::from_secs_f64(now_secs);
-        let taken = publisher.take(session.picture(Vec::new()), Vec::new(), false, now);
+        let taken = publisher.take(session.picture(Vec::new()), Vec::new(), Occasion::Motion, now);
         let Taken::New(shown) = taken else { continue };
         let counts = now_secs > from_secs;
         for exact_tiles in [0, 32] {

@@ -6,6 +6,7 @@ PROGRAM is `frameless`. FOLDER takes screenshots of what failed, and of the page
 those checks run. Exits with 1 if a check fails.
 """
 
+import os
 import subprocess
 import sys
 import time
@@ -19,6 +20,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 import glb
+from light_client import LightClient
 from serving import Server, View, launch, psnr
 
 # Few pixels come to rest soon, even on a busy machine.
@@ -449,6 +451,30 @@ def says_why_it_cannot_come_back(bench: Bench) -> str:
     return "another secret, no room"
 
 
+def waits_without_work_for_who_says_nothing(bench: Bench) -> str:
+    if not Path("/proc/self/task").exists():
+        return "SKIPPED: the threads' times are told in /proc, on Linux only"
+    with Server(bench.program, *SCENE) as server:
+        client = LightClient(server.url)
+        time.sleep(3)
+        before = _network_secs(server)
+        time.sleep(3)
+        secs = _network_secs(server) - before
+        client.socket.close()
+    assert secs < 0.5, f"{secs:.2f} s of work in 3 s for a client that has no room"
+    return f"{secs:.2f} s of work in 3 s"
+
+
+def _network_secs(server: Server) -> float:
+    """What the server's network threads have worked."""
+    ticks = 0
+    for thread in Path(f"/proc/{server.process.pid}/task").iterdir():
+        name, fields = (thread / "stat").read_text().split("(", 1)[1].rsplit(")", 1)
+        if name == "web":
+            ticks += sum(int(field) for field in fields.split()[11:13])
+    return ticks / os.sysconf("SC_CLK_TCK")
+
+
 def is_accessible(bench: Bench) -> str:
     checked = 0
     for theme in ("dark", "light"):
@@ -526,6 +552,7 @@ CHECKS = [
     saves_and_records,
     comes_back_by_itself,
     says_why_it_cannot_come_back,
+    waits_without_work_for_who_says_nothing,
     is_accessible,
     refuses_broken_messages,
 ]

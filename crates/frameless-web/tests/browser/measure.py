@@ -185,17 +185,19 @@ def _frames(bench: Bench, view: View) -> float:
 
 def rest(bench: Bench) -> dict:
     """How long after motion the canvas is the server's picture, and the traffic once nothing changes any longer."""
-    plain, refined = [], []
+    refined, plain = [], []
     with bench.server() as server, bench.view(server) as view:
         view.pause()
+        for turn in range(max(3, int(bench.secs(20)))):
+            refined.append(_drag_and_wait(view, turn))
         view.page.uncheck("#antialias")
         for turn in range(max(3, int(bench.secs(20)))):
-            plain.append(_drag_and_wait(view, turn)[0])
+            plain.append(_drag_and_wait(view, turn))
         view.page.check("#antialias")
-        for turn in range(max(2, int(bench.secs(10)))):
-            refined.append(_drag_and_wait(view, turn)[1])
-        view.exact(60)
+        view.page.wait_for_timeout(1000)
+        shares = view.page.evaluate(SHARE_EXACT, [bench.secs(10)])
         view.page.wait_for_timeout(bench.secs(30_000))
+        view.exact(60)
         traffic = Traffic(view)
         bytes_per_sec = traffic.per_sec(view, bench.secs(30))
         same = np.array_equal(view.pixels(), view.server_pixels())
@@ -203,28 +205,38 @@ def rest(bench: Bench) -> dict:
         "rest_bytes_per_sec": round(bytes_per_sec, 1),
         "rest_messages": traffic.messages,
         "rest_is_bit_exact": bool(same),
-        "exact_after_last_input_ms": percentiles(plain, 50, 100),
-        "exact_after_newest_picture_ms": percentiles(refined, 50, 100),
+        "exact_after_last_input_ms": percentiles(refined, 50, 100),
+        "exact_without_antialias_ms": percentiles(plain, 50, 100),
+        "share_of_time_exact_while_refined": round(shares, 2),
     }
 
 
-def _drag_and_wait(view: View, turn: int) -> list[float]:
+def _drag_and_wait(view: View, turn: int) -> float:
     view.page.wait_for_timeout(300 + 61 * (turn % 7))
     view.drag(by=(40 if turn % 2 else -40, 10), steps=6)
-    return view.page.evaluate(UNTIL_EXACT)
+    return view.page.evaluate(FIRST_EXACT)
 
 
-# Milliseconds until the page has found its canvas equal to the server's picture, and that has stayed so for half a second: from now,
-# and from the first tiles of that picture.
-UNTIL_EXACT = """() => new Promise((done) => {
+# Milliseconds from the last of the pointer's events until the page has found its canvas equal to the server's newest picture.
+FIRST_EXACT = """() => new Promise((done) => {
   const canvas = document.querySelector("#picture");
-  const begin = performance.now();
-  let since = null;
   const look = () => {
-    const now = performance.now();
-    if (canvas.dataset.exact !== "true" || seen.last > (since ?? 0)) since = canvas.dataset.exact === "true" ? now : null;
-    if (since !== null && now - since > 500) done([since - begin, since - seen.begun]);
-    else setTimeout(look, 4);
+    if (canvas.dataset.exact === "true" && seen.last > seen.acted) done(performance.now() - seen.acted);
+    else setTimeout(look, 2);
+  };
+  look();
+})"""
+
+# Of some seconds, in which share the canvas was.
+SHARE_EXACT = """([secs]) => new Promise((done) => {
+  const canvas = document.querySelector("#picture");
+  const end = performance.now() + 1000 * secs;
+  let [looks, exact] = [0, 0];
+  const look = () => {
+    looks++;
+    exact += canvas.dataset.exact === "true";
+    if (performance.now() > end) done(exact / looks);
+    else setTimeout(look, 2);
   };
   look();
 })"""

@@ -183,7 +183,8 @@ class View:
 
 # What the page tells of what it draws, counted from its beginning.
 LISTEN = """
-window.seen = { drawn: 0, last: 0, pictures: 0, picture: 0, begun: 0, latencies: [] };
+document.addEventListener("pointermove", () => (seen.acted = performance.now()), true);
+window.seen = { drawn: 0, last: 0, acted: 0, pictures: 0, picture: 0, begun: 0, latencies: [] };
 document.addEventListener("frameless:drawn", ({ detail }) => {
   seen.drawn++;
   seen.last = performance.now();

@@ -1,12 +1,13 @@
 //! What a client's canvas comes to show.
 
 use std::io::{Read, Write};
+use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 use frameless::Size;
 use frameless_web::Options;
 
-use crate::support::{Client, PATIENCE, Received, options, start, start_at};
+use crate::support::{Answer, Client, PATIENCE, Received, options, start, start_at};
 
 #[test]
 fn at_rest_the_canvas_is_the_servers_picture_and_then_nothing_is_sent() {
@@ -194,6 +195,33 @@ fn an_upload_is_refused_before_it_is_read() {
     let (status, text) = refused("", &own(&watcher));
     assert!(status == 403 && text.contains("drives"), "{status} {text}");
     assert_eq!(refused("?client=1", &own(&driver)).0, 400, "who it is is not said in the address");
+}
+
+#[test]
+fn who_has_lost_the_helm_keeps_nobody_from_uploading() {
+    let running = start(options());
+    let slow = Client::connect(&running);
+    let mut next = Client::connect(&running);
+    let (pass, origin) = (running.pass(), running.origin());
+    let head = |client: &Client, bytes: usize| {
+        let token = &client.token;
+        format!(
+            "POST /upload HTTP/1.1\r\n{pass}Origin: {origin}\r\nX-Client: {token}\r\nContent-Length: {bytes}\r\n\r\n"
+        )
+    };
+    let mut stream = TcpStream::connect(running.address).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
+    stream.write_all(head(&slow, 100_000).as_bytes()).unwrap();
+    stream.write_all(b"{").unwrap();
+    std::thread::sleep(Duration::from_millis(700));
+    next.say(r#"{"type": "drive", "on": true}"#);
+    let number = next.number;
+    next.state("the helm", |state| state["driver"] == number);
+    assert_eq!(running.ask(format!("{}{{}}", head(&next, 2)).as_bytes()).status, 503, "waits");
+    stream.write_all(b"}").unwrap();
+    assert_eq!(Answer::read(&mut stream, false).status, 403);
+    let answer = running.ask(format!("{}{{}}", head(&next, 2)).as_bytes());
+    assert_eq!(answer.status, 422, "taken, read, and no scene");
 }
 
 #[test]

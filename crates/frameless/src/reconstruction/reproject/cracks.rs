@@ -3,35 +3,47 @@
 //! A sample goes if, of those within a pixel's distance, at least six are of other objects and nearer by 7 %, and at most one is not
 //! (with more cells per pixel, a few more).
 
+use std::ops::Range;
+
 use super::store::{EMPTY, Layout, Store};
+use crate::bands;
 use crate::wide::{self, F8, M8, Unit};
 
 /// A neighbour nearer by more than this ratio covers what is behind it.
 const COVERS: f32 = 0.07;
 
-/// After the warp. `covered` is scratch memory.
-pub(super) fn remove(store: &mut Store, covered: &mut Vec<u32>) {
-    covered.clear();
-    wide::run(Cracks { store, covered });
-    for &i in covered.iter() {
+/// After the warp. `covered` is scratch memory: cells of each band of rows.
+pub(super) fn remove(store: &mut Store, threads: usize, covered: &mut Vec<Vec<u32>>) {
+    let height = store.layout.size.height;
+    let rows = bands::rows(height, threads);
+    covered.resize_with(height.div_ceil(rows) as usize, Vec::new);
+    let whole = &*store;
+    let bands = covered.iter_mut().zip((0..height).step_by(rows as usize)).map(|(covered, row)| {
+        // Pixels at the border have no neighbours on all sides.
+        let rows = row.max(1) as i32..(row + rows).min(height.saturating_sub(1)) as i32;
+        Cracks { store: whole, rows, covered }
+    });
+    bands::run(threads, bands.collect(), wide::run);
+    for i in covered.iter_mut().flat_map(|cells| cells.drain(..)) {
         store.object[i as usize] = EMPTY;
     }
 }
 
 struct Cracks<'a> {
     store: &'a Store,
+    rows: Range<i32>,
     covered: &'a mut Vec<u32>,
 }
 
 impl wide::Task for Cracks<'_> {
     #[inline(always)]
     fn run<U: Unit>(self) {
-        let Cracks { store, covered } = self;
+        let Cracks { store, rows, covered } = self;
         let layout = &store.layout;
         let (n, size) = (layout.per_side as i32, layout.size);
         for sub in 0..n * n {
             let around = Around::new(layout, sub);
-            for y in 1..size.height as i32 - 1 {
+            for y in rows.clone() {
                 for x in (1..size.width as i32 - 1).step_by(8) {
                     let first = layout.of_pixel(x, y) + sub as usize * layout.plane;
                     let inside = M8::<U>::first_lanes((size.width as i32 - 1 - x) as usize);

@@ -6,6 +6,7 @@
 //! land on pixel centres at the next refresh ([`aim`]).
 
 mod aim;
+mod cells;
 mod covers;
 mod cracks;
 mod fill;
@@ -56,7 +57,7 @@ pub struct Reproject {
     contrast: Vec<f32>,
     holes: Vec<u32>,
     edges: Vec<u32>,
-    covered: Vec<u32>,
+    covered: Vec<Vec<u32>>,
     no_rates: Option<Rates>,
 }
 
@@ -112,6 +113,10 @@ impl Reproject {
     /// memory would take longer than everything else.
     #[inline(always)]
     fn prefetch(&self, kept: &Kept<'_>, i: usize) {
+        if let Some(request) = kept.requests.get(i + SHADE_AHEAD) {
+            let (x, y) = kept.size.xy(request.pixel);
+            self.store.prefetch_shade(x, y);
+        }
         let Some(&Request { pixel, .. }) = kept.requests.get(i + AHEAD) else { return };
         let Size { width, height } = kept.size;
         let (x, y) = kept.size.xy(pixel);
@@ -155,6 +160,8 @@ impl Reproject {
 
 /// So many samples later what is prefetched is used.
 const AHEAD: usize = 16;
+/// The same of what is found by what was prefetched first.
+const SHADE_AHEAD: usize = 8;
 
 /// A suspect pixel whose centre was traced later than this before is not looked at again: it shows something finer than a pixel.
 const LONG_SINCE_SECS: f64 = 0.05;
@@ -231,9 +238,9 @@ impl Reproject {
             // Of what was kept before the first refresh nobody knows yet where it is.
             let (first, settled) = (self.refreshes < 2, &self.settled);
             let rests = |object| object == store::SCREEN || !first && settled.rests(object);
-            self.warp.run(&mut self.store, &self.poses[0], rests);
+            self.warp.run(&mut self.store, &self.poses[0], refresh.threads, rests);
             if self.options.without != Some(ReprojectStage::Cracks) {
-                cracks::remove(&mut self.store, &mut self.covered);
+                cracks::remove(&mut self.store, refresh.threads, &mut self.covered);
             }
         }
         if self.options.without != Some(ReprojectStage::Covers) {

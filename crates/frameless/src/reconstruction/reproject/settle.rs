@@ -111,6 +111,7 @@ impl Settled {
     pub(super) fn prefetch(&self, pixel: u32) {
         wide::prefetch(&self.count, pixel as usize);
         wide::prefetch(&self.sum, pixel as usize);
+        wide::prefetch(&self.spread, pixel as usize);
         wide::prefetch(&self.encoded, pixel as usize);
     }
 

@@ -88,6 +88,8 @@ impl Tick {
 }
 
 impl Shade {
+    // Inlined: what is written to memory in small parts and read in large ones at once has to wait for all that was written before.
+    #[inline(always)]
     fn new(surface: Option<&Surface>, rgb: [f32; 3]) -> Shade {
         let Some(surface) = surface else { return Shade { rgb, ..Shade::default() } };
         Shade {
@@ -154,7 +156,13 @@ impl Layout {
     /// Where the first sub-grid's cell of pixel (x, y) is; −1 and the width or height lie in the border.
     #[inline(always)]
     pub(super) fn of_pixel(&self, x: i32, y: i32) -> usize {
-        (y + 1) as usize * self.stride + (x + 1) as usize
+        self.row(y) + (x + 1) as usize
+    }
+
+    /// Where the first sub-grid's row of pixels y begins, with the border to its left.
+    #[inline(always)]
+    pub(super) fn row(&self, y: i32) -> usize {
+        (y + 1) as usize * self.stride
     }
 
     /// The cell at a position in the picture, in pixels; `None` outside.
@@ -284,6 +292,14 @@ impl Store {
                 .into_iter()
                 .for_each(|plane| wide::prefetch(plane, i));
             wide::prefetch(&self.anchor, i);
+        }
+    }
+
+    /// The same of what their shading takes, once the former is there.
+    #[inline(always)]
+    pub(super) fn prefetch_shade(&self, x: u32, y: u32) {
+        for i in self.of_pixel(x, y) {
+            wide::prefetch(&self.shade, self.slot[i] as usize);
         }
     }
 

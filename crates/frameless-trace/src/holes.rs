@@ -1,0 +1,268 @@
+//! Rays through what has holes: masked texels, surfaces that blend with what is behind them, glass.
+//!
+//! Asked from within the walk through a mesh's tree, and only of meshes that [may have holes](may_have_holes): all others are as fast as
+//! if there were none.
+
+use frameless_scene::{AlphaMode, Geometry, Material, Mesh, Scene};
+use glam::Vec3A;
+
+use crate::fresnel::Dielectric;
+use crate::matter::{Matter, coverage};
+use crate::moment::Moment;
+use crate::point::{Placement, Point};
+use crate::ray::{Hit, Ray};
+use crate::sift::Sieve;
+use crate::traverse::Stack;
+use crate::world::World;
+
+/// How a surface that blends decides whether it is there.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Chance {
+    /// It is, unless it is wholly transparent: whoever asks goes on behind it.
+    Never,
+    /// With its alpha as the probability. The same number, surface and triangle always have the same answer.
+    By(u32),
+}
+
+/// Whether rays may pass a mesh's triangles.
+pub(crate) fn may_have_holes(scene: &Scene, mesh: &Mesh) -> bool {
+    let mut materials = mesh.triangle_materials.clone();
+    materials.sort_unstable();
+    materials.dedup();
+    let lets_pass = |material: &Material| {
+        let is_whole = material.base_color.w >= 1.0
+            && material.base_color_texture.is_none()
+            && mesh.colors.is_empty();
+        let is_clear = material.layers.as_ref().is_some_and(|layers| layers.transmission > 0.0);
+        is_clear
+            || match material.alpha_mode {
+                AlphaMode::Opaque => false,
+                AlphaMode::Blend => !is_whole,
+                AlphaMode::Mask { cutoff } => !is_whole || cutoff > 1.0,
+            }
+    };
+    materials.iter().any(|&m| scene.materials.get(m as usize).is_some_and(lets_pass))
+}
+
+impl World {
+    /// The nearest hit along a ray that is there.
+    #[inline(always)]
+    pub(crate) fn nearest(
+        &self,
+        moment: &Moment,
+        ray: &Ray,
+        chance: Chance,
+        stack: &mut Stack,
+    ) -> Option<Hit> {
+        if self.has_holes {
+            return self.nearest_through(moment, ray, (chance, false), stack);
+        }
+        moment.targets(self).closest(ray, stack)
+    }
+
+    /// Whether the camera does not see what it has hit, but what is [behind](World::behind_back).
+    #[inline(always)]
+    pub(crate) fn is_culled(&self, hit: &Hit, point: &Point) -> bool {
+        !point.is_front && has_no_back(self, hit)
+    }
+
+    /// What a camera's ray meets that passes backs: seldom asked, since whoever looks at a closed body from outside meets its front first.
+    #[cold]
+    pub(crate) fn behind_back(
+        &self,
+        moment: &Moment,
+        ray: &Ray,
+        chance: Chance,
+        stack: &mut Stack,
+    ) -> Option<Hit> {
+        self.nearest_through(moment, ray, (chance, true), stack)
+    }
+
+    #[inline(never)]
+    fn nearest_through(
+        &self,
+        moment: &Moment,
+        ray: &Ray,
+        (chance, culls): (Chance, bool),
+        stack: &mut Stack,
+    ) -> Option<Hit> {
+        let mut holes = Holes { world: self, moment, ray, chance, culls };
+        moment.targets(self).closest_through(ray, &mut holes, stack)
+    }
+
+    /// Which part of the light reaches a ray's origin from its point at `t_max`. Glass lets it pass, straight on, if `through_glass`.
+    #[inline(always)]
+    pub(crate) fn passing(
+        &self,
+        moment: &Moment,
+        ray: &Ray,
+        t_max: f32,
+        through_glass: bool,
+        stack: &mut Stack,
+    ) -> Vec3A {
+        if self.has_holes {
+            return self.passing_holes(moment, ray, t_max, through_glass, stack);
+        }
+        let is_shaded = moment.targets(self).occluded(ray, t_max, stack);
+        if is_shaded { Vec3A::ZERO } else { Vec3A::ONE }
+    }
+
+    #[inline(never)]
+    fn passing_holes(
+        &self,
+        moment: &Moment,
+        ray: &Ray,
+        t_max: f32,
+        through_glass: bool,
+        stack: &mut Stack,
+    ) -> Vec3A {
+        let targets = moment.targets(self);
+        let mut shade = Shade {
+            world: self,
+            moment,
+            ray,
+            through_glass,
+            passes: Vec3A::ONE,
+            depth: Vec3A::ZERO,
+            inside: Vec3A::ZERO,
+        };
+        if targets.occluded_through(ray, t_max, &mut shade, stack) {
+            return Vec3A::ZERO;
+        }
+        shade.result(t_max)
+    }
+}
+
+/// What a camera's or a path's ray meets.
+struct Holes<'a> {
+    world: &'a World,
+    moment: &'a Moment,
+    ray: &'a Ray,
+    chance: Chance,
+    /// Whether the backs of single-sided triangles are not there.
+    culls: bool,
+}
+
+impl Sieve for Holes<'_> {
+    fn is_for_all(&self) -> bool {
+        self.culls
+    }
+
+    fn stops(&mut self, hit: &Hit) -> bool {
+        let Some(material) = material(self.world, hit) else { return true };
+        let asks_side = self.culls && has_no_back(self.world, hit);
+        if material.alpha_mode == AlphaMode::Opaque && !asks_side {
+            return true;
+        }
+        let place = Placement::new(self.world, self.moment, self.ray, hit);
+        if asks_side && !place.is_front {
+            return false;
+        }
+        let coverage = coverage(self.world, material, &place.patch, place.color);
+        match (material.alpha_mode, self.chance) {
+            (AlphaMode::Blend, Chance::By(number)) => unit(number, hit) < coverage,
+            _ => coverage > 0.0,
+        }
+    }
+}
+
+/// What is on the way of light.
+struct Shade<'a> {
+    world: &'a World,
+    moment: &'a Moment,
+    ray: &'a Ray,
+    through_glass: bool,
+    passes: Vec3A,
+    /// Σ σ · way in what encloses, of leaving minus entering it: in whichever order they are met.
+    depth: Vec3A,
+    /// Σ σ of what is entered and not left.
+    inside: Vec3A,
+}
+
+impl Sieve for Shade<'_> {
+    fn is_for_all(&self) -> bool {
+        false
+    }
+
+    fn stops(&mut self, hit: &Hit) -> bool {
+        let Some(material) = material(self.world, hit) else { return true };
+        let is_clear = material.layers.as_ref().is_some_and(|layers| layers.transmission > 0.0);
+        let lets_pass = self.through_glass && is_clear;
+        if material.alpha_mode == AlphaMode::Opaque && !lets_pass {
+            return true;
+        }
+        let place = Placement::new(self.world, self.moment, self.ray, hit);
+        let coverage = coverage(self.world, material, &place.patch, place.color);
+        let through = if lets_pass && coverage > 0.0 {
+            self.glass(material, &place, hit)
+        } else {
+            Vec3A::ZERO
+        };
+        self.passes *= Vec3A::splat(1.0 - coverage) + coverage * through;
+        self.passes == Vec3A::ZERO
+    }
+}
+
+impl Shade<'_> {
+    /// What a clear surface lets pass.
+    fn glass(&mut self, material: &Material, place: &Placement<'_>, hit: &Hit) -> Vec3A {
+        let matter = Matter::new(self.world, material, &place.patch, place.color);
+        let Some(layers) = &matter.layers else { return Vec3A::ZERO };
+        let volume = material.layers.as_ref().and_then(|layers| layers.volume);
+        let sigma = volume.map_or(Vec3A::ZERO, |volume| volume.absorption_per_m.into());
+        let sign = if place.is_front { -1.0 } else { 1.0 };
+        self.depth += sign * hit.t * sigma;
+        self.inside -= sign * sigma;
+        let fresnel = Dielectric::new(&matter).reflectance(place.cosine);
+        let clear = layers.transmission * (1.0 - matter.metallic) * (1.0 - fresnel.max_element());
+        clear * matter.base
+    }
+
+    fn result(&self, t_max: f32) -> Vec3A {
+        if self.depth == Vec3A::ZERO && self.inside == Vec3A::ZERO {
+            return self.passes;
+        }
+        let still_inside = if t_max.is_finite() { t_max } else { 0.0 };
+        let depth = self.depth + still_inside * self.inside.max(Vec3A::ZERO);
+        let metres = self.ray.direction.length();
+        self.passes * attenuation(depth, metres)
+    }
+}
+
+/// e^(−σ · way), at most 1.
+pub(crate) fn attenuation(sigma: Vec3A, way_m: f32) -> Vec3A {
+    let depth = (sigma * way_m).max(Vec3A::ZERO);
+    // 0 · ∞: what absorbs nothing.
+    Vec3A::from_array((-depth).to_array().map(|x| if x.is_nan() { 1.0 } else { x.exp() }))
+}
+
+/// Whether the camera passes the surface from behind. The back of what encloses a volume is the way out of it, which is seen whatever the
+/// file says.
+fn has_no_back(world: &World, hit: &Hit) -> bool {
+    let encloses = |material: &Material| {
+        let layers = material.layers.as_ref();
+        layers.is_some_and(|layers| layers.volume.is_some() && layers.transmission > 0.0)
+    };
+    material(world, hit).is_some_and(|material| !material.double_sided && !encloses(material))
+}
+
+/// `None` for spheres, which have no holes and no backs.
+fn material<'a>(world: &'a World, hit: &Hit) -> Option<&'a Material> {
+    let scene = world.scene();
+    let geometry = scene.instances[hit.instance as usize].geometry;
+    match &scene.geometries[geometry as usize] {
+        Geometry::Sphere { .. } => None,
+        Geometry::Mesh(mesh) => {
+            Some(&scene.materials[mesh.triangle_materials[hit.primitive as usize] as usize])
+        }
+    }
+}
+
+/// In [0, 1), by a number and a triangle.
+fn unit(number: u32, hit: &Hit) -> f32 {
+    const PART: f32 = 1.0 / (1 << 24) as f32;
+    let bits = crate::path::mixed(
+        number ^ crate::path::mixed(hit.instance ^ crate::path::mixed(hit.primitive)),
+    );
+    (bits >> 8) as f32 * PART
+}

@@ -1,0 +1,297 @@
+//! Samples of neighbouring rows, lifted and put down.
+
+use std::ops::Range;
+
+use super::{GONE_PX, Moved, Mover, NO_SLOT, NOWHERE, put_down};
+use crate::pose::BEHIND;
+use crate::reconstruction::reproject::cells::Cells;
+use crate::reconstruction::reproject::store::{Anchor, EMPTY, Layout};
+use crate::wide::{self, F8, M8, Unit};
+use crate::{Pose, Surface, Window};
+
+/// Rows that are lifted before the first of them is put down again. Few enough to lie in the cache, and enough that nearly all
+/// samples come to rows that have been lifted.
+const ROWS_AHEAD: usize = 8;
+
+/// Carries the samples of a band of rows.
+pub(super) struct Carry<'a, F> {
+    pub(super) layout: Layout,
+    pub(super) pose: &'a Pose,
+    /// Of an object number, whether its samples stay where they are.
+    pub(super) rests: &'a F,
+    pub(super) band: Band<'a>,
+    pub(super) lifted: &'a mut Lifted,
+}
+
+/// Neighbouring rows.
+pub(super) struct Band<'a> {
+    pub(super) rows: Range<i32>,
+    pub(super) cells: Cells<'a>,
+    /// The number of the first of its cells in the whole store.
+    pub(super) first: usize,
+    pub(super) moved: &'a mut Moved,
+}
+
+/// Scratch memory: the samples of one row in each, turn by turn.
+#[derive(Default)]
+pub(super) struct Lifted([Row; ROWS_AHEAD]);
+
+#[derive(Default)]
+struct Row {
+    eights: Vec<Eight>,
+    len: usize,
+}
+
+/// Eight neighbouring cells, some of whose samples have been lifted.
+#[derive(Clone, Default)]
+struct Eight {
+    /// A bit per lane: whose sample moves.
+    lanes: u32,
+    /// Where it is now: the cell, [`NOWHERE`] outside the picture, the position in pixels, the depth.
+    cell: [u32; 8],
+    px: [[f32; 8]; 2],
+    depth: [f32; 8],
+    rgb: [[f32; 8]; 3],
+    tick: [u32; 8],
+    object: [u32; 8],
+    slot: [u32; 8],
+    anchor: [Anchor; 8],
+}
+
+impl Eight {
+    #[inline(always)]
+    fn mover(&self, lane: usize) -> Mover {
+        Mover {
+            px: [self.px[0][lane], self.px[1][lane]],
+            depth: self.depth[lane],
+            rgb: [self.rgb[0][lane], self.rgb[1][lane], self.rgb[2][lane]],
+            tick: self.tick[lane],
+            object: self.object[lane],
+            slot: self.slot[lane],
+            anchor: self.anchor[lane],
+        }
+    }
+}
+
+impl Row {
+    #[inline(always)]
+    fn next(&mut self) -> &mut Eight {
+        if self.len == self.eights.len() {
+            self.eights.push(Eight::default());
+        }
+        self.len += 1;
+        &mut self.eights[self.len - 1]
+    }
+}
+
+impl<F: Fn(u32) -> bool> wide::Task for Carry<'_, F> {
+    #[inline(always)]
+    fn run<U: Unit>(mut self) {
+        let Range { start, end } = self.band.rows;
+        for row in start..end + ROWS_AHEAD as i32 {
+            // Whose turn it is to be lifted next is put down first.
+            let turn = row as usize % ROWS_AHEAD;
+            if row >= start + ROWS_AHEAD as i32 {
+                self.put_down_row(turn, start..row.min(end));
+            }
+            if row < end {
+                self.lift_row::<U>(row, turn);
+            }
+        }
+    }
+}
+
+/// Where eight samples are.
+struct There<U: Unit> {
+    px: [F8<U>; 2],
+    depth: F8<U>,
+}
+
+impl<F: Fn(u32) -> bool> Carry<'_, F> {
+    #[inline(always)]
+    fn lift_row<U: Unit>(&mut self, y: i32, turn: usize) {
+        self.lifted.0[turn].len = 0;
+        let Layout { size, plane, .. } = self.layout;
+        for sub in 0..self.layout.subs() {
+            let row = self.layout.of_pixel(0, y) + sub * plane - self.band.first;
+            for x in (0..size.width as usize).step_by(8) {
+                self.lift_eight::<U>(row + x, turn);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn lift_eight<U: Unit>(&mut self, start: usize, turn: usize) {
+        let Band { cells, first, moved, .. } = &mut self.band;
+        let objects = M8::<U>::load(cells.object, start);
+        let mut waiting = objects.equals(M8::splat(EMPTY)).not();
+        let mut moving = M8::splat(0);
+        let gone = F8::splat(GONE_PX);
+        let mut there = There { px: [gone; 2], depth: gone };
+        while let Some(lane) = waiting.first() {
+            let object = cells.object[start + lane];
+            let same = objects.equals(M8::splat(object));
+            waiting = waiting.and(same.not());
+            if !(self.rests)(object) {
+                moving = moving.either(same);
+                let now = carry_eight(cells, self.pose, object, start);
+                there.px = F8::all_or(now.px, same, there.px);
+                there.depth = now.depth.or(same, there.depth);
+            }
+        }
+        if moving.any() {
+            moved.starts.push((*first + start) as u32);
+            let to = cells_at(&self.layout, there.px);
+            lift(cells, start, moving, &there, to, self.lifted.0[turn].next());
+        }
+    }
+
+    /// `lifted`: the rows that have been lifted so far.
+    #[inline(always)]
+    fn put_down_row(&mut self, turn: usize, lifted: Range<i32>) {
+        let Band { cells, first, moved, .. } = &mut self.band;
+        let Moved { early, losers, free, .. } = &mut **moved;
+        let plane = self.layout.plane as u32;
+        let here = self.layout.row(lifted.start) as u32..self.layout.row(lifted.end) as u32;
+        let row = &self.lifted.0[turn];
+        for eight in &row.eights[..row.len] {
+            let mut lanes = eight.lanes;
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize;
+                lanes &= lanes - 1;
+                let (cell, mover) = (eight.cell[lane], eight.mover(lane));
+                let in_plane = if cell < plane { cell } else { cell % plane };
+                if here.contains(&in_plane) {
+                    put_down(cells, cell as usize - *first, &mover, losers, free);
+                } else if cell == NOWHERE {
+                    free.push(mover.slot);
+                } else {
+                    early.push((cell, mover));
+                }
+            }
+        }
+    }
+}
+
+/// Takes the samples that are `moving` out of their cells; `to`: the cells where they are now.
+#[inline(always)]
+fn lift<U: Unit>(
+    cells: &mut Cells<'_>,
+    start: usize,
+    moving: M8<U>,
+    there: &There<U>,
+    to: M8<U>,
+    eight: &mut Eight,
+) {
+    let (object, slot) = (M8::load(cells.object, start), M8::load(cells.slot, start));
+    M8::splat(EMPTY).or(moving, object).store(cells.object, start);
+    M8::splat(NO_SLOT).or(moving, slot).store(cells.slot, start);
+    eight.lanes = moving.bits();
+    eight.cell = to.lanes();
+    eight.px = [there.px[0].lanes(), there.px[1].lanes()];
+    eight.depth = there.depth.lanes();
+    for (rgb, plane) in eight.rgb.iter_mut().zip(&cells.rgb) {
+        rgb.copy_from_slice(&plane[start..start + 8]);
+    }
+    eight.tick.copy_from_slice(&cells.tick[start..start + 8]);
+    eight.object = object.lanes();
+    eight.slot = slot.lanes();
+    eight.anchor.copy_from_slice(&cells.anchor[start..start + 8]);
+}
+
+/// The eight samples from `start` on, as if all were of the same object.
+#[inline(always)]
+fn carry_eight<U: Unit>(cells: &Cells<'_>, pose: &Pose, object: u32, start: usize) -> There<U> {
+    let gone = F8::splat(GONE_PX);
+    if matches!(pose.deformed.get(object as usize), Some(Some(_))) {
+        return carry_deformed(cells, pose, object, start);
+    }
+    let projection = match object {
+        Surface::SKY => pose.picture_from_sky.as_ref(),
+        object => pose.picture_from_object.get(object as usize),
+    };
+    let Some(projection) = projection else { return There { px: [gone; 2], depth: gone } };
+    let (anchors, _) = cells.anchor[start..start + 8].as_chunks::<8>();
+    let [x, y, z, _] = F8::columns(anchors[0].each_ref().map(|anchor| &anchor.0));
+    let row = |k: usize| {
+        let [a, b, c, d] = projection.0[k];
+        F8::splat(a) * x + F8::splat(b) * y + (F8::splat(c) * z + F8::splat(d))
+    };
+    let w = row(3);
+    let per_w = F8::splat(1.0) / w;
+    let px = [row(0) * per_w, row(1) * per_w];
+    let infinite = if object == Surface::SKY { f32::INFINITY } else { 0.0 };
+    let mut there = There { px, depth: row(2) + F8::splat(infinite) };
+    let mut is_seen = F8::splat(0.0).less_than(w);
+    if let Some(window) = pose.window(object) {
+        is_seen = is_seen.and(there.is_in(window));
+    } else {
+        for window in &pose.windows {
+            is_seen = is_seen.and(there.is_hidden_by(window).not());
+        }
+    }
+    there.px = F8::all_or(px, is_seen, [gone; 2]);
+    there
+}
+
+impl<U: Unit> There<U> {
+    /// [`Window::contains`], eight at a time.
+    #[inline(always)]
+    fn is_in(&self, window: &Window) -> M8<U> {
+        let mut outside = M8::splat(0);
+        for edge in &window.edges {
+            outside = outside.either(self.at(edge).less_than(F8::splat(0.0)));
+        }
+        outside.not()
+    }
+
+    /// [`Window::hides`], eight at a time.
+    #[inline(always)]
+    fn is_hidden_by(&self, window: &Window) -> M8<U> {
+        let [n, d] = [self.at(&window.depth[0]), self.at(&window.depth[1])];
+        let is_behind = (n * F8::splat(BEHIND)).less_than(self.depth * d);
+        if is_behind.any() { is_behind.and(self.is_in(window)) } else { is_behind }
+    }
+
+    #[inline(always)]
+    fn at(&self, &[a, b, c]: &[f32; 3]) -> F8<U> {
+        F8::splat(a) * self.px[0] + (F8::splat(b) * self.px[1] + F8::splat(c))
+    }
+}
+
+fn carry_deformed<U: Unit>(cells: &Cells<'_>, pose: &Pose, object: u32, start: usize) -> There<U> {
+    let (mut px, mut depth) = ([[GONE_PX; 8]; 2], [GONE_PX; 8]);
+    for lane in 0..8 {
+        if cells.object[start + lane] == object
+            && let Some(now) = pose.project(&cells.surface(start + lane))
+        {
+            (0..2).for_each(|k| px[k][lane] = now.px[k]);
+            depth[lane] = now.depth;
+        }
+    }
+    There { px: px.map(F8::new), depth: F8::new(depth) }
+}
+
+/// [`Layout::of_px`], eight at a time; [`NOWHERE`] outside.
+#[inline(always)]
+fn cells_at<U: Unit>(layout: &Layout, px: [F8<U>; 2]) -> M8<U> {
+    let zero = F8::splat(0.0);
+    let (left, above) = (px[0].less_than(zero), px[1].less_than(zero));
+    let size = layout.size;
+    let inside = px[0].less_than(F8::splat(size.width as f32));
+    let inside = inside.and(px[1].less_than(F8::splat(size.height as f32)));
+    let inside = inside.and(left.not()).and(above.not());
+    let (column, row) = (px[0].truncated(), px[1].truncated());
+    let first = row.times(M8::splat(layout.stride as u32)).plus(column);
+    let mut cell = first.plus(M8::splat(layout.of_pixel(0, 0) as u32));
+    if layout.per_side > 1 {
+        let (n, last) = (layout.per_side, M8::splat(layout.per_side - 1));
+        let sub = |p: F8<U>, whole: M8<U>| {
+            let sub = ((p - whole.to_f32()) * F8::splat(n as f32)).truncated();
+            sub.or(sub.less_than(last), last)
+        };
+        let sub = sub(px[1], row).times(M8::splat(n)).plus(sub(px[0], column));
+        cell = cell.plus(sub.times(M8::splat(layout.plane as u32)));
+    }
+    cell.or(inside, M8::splat(NOWHERE))
+}
