@@ -26,9 +26,15 @@ pub(crate) fn run(mut command: Command) -> Result<()> {
     Ok(())
 }
 
-/// Run to the end, passing its output on line by line and returning it too (standard output first).
+/// Run to the end, passing on line by line what is `worth_showing` and returning all of its output (standard output first).
 /// The second value says whether it succeeded.
-pub(crate) fn watch(mut command: Command) -> Result<(String, bool)> {
+pub(crate) fn watch<W>(
+    mut command: Command,
+    worth_showing: impl Fn() -> W,
+) -> Result<(String, bool)>
+where
+    W: FnMut(&str) -> bool + Send + 'static,
+{
     let shown = show(&command);
     eprintln!("$ {shown}");
     let mut child = command
@@ -36,19 +42,28 @@ pub(crate) fn watch(mut command: Command) -> Result<(String, bool)> {
         .stderr(Stdio::piped())
         .spawn()
         .with_context(|| format!("cannot start `{shown}`"))?;
-    let out = child.stdout.take().map(|pipe| thread::spawn(|| pass_on(pipe, std::io::stdout())));
-    let err = child.stderr.take().map(|pipe| thread::spawn(|| pass_on(pipe, std::io::stderr())));
+    let (to_out, to_err) = (worth_showing(), worth_showing());
+    let out = child.stdout.take();
+    let out = out.map(|pipe| thread::spawn(|| pass_on(pipe, std::io::stdout(), to_out)));
+    let err = child.stderr.take();
+    let err = err.map(|pipe| thread::spawn(|| pass_on(pipe, std::io::stderr(), to_err)));
     let status = child.wait()?;
     let text = [out, err].into_iter().flatten().filter_map(|reader| reader.join().ok()).collect();
     Ok((text, status.success()))
 }
 
-fn pass_on(pipe: impl Read, mut to: impl Write) -> String {
+fn pass_on(
+    pipe: impl Read,
+    mut to: impl Write,
+    mut is_worth_showing: impl FnMut(&str) -> bool,
+) -> String {
     let mut text = String::new();
     for line in BufReader::new(pipe).split(b'\n').map_while(Result::ok) {
         let line = String::from_utf8_lossy(&line).into_owned() + "\n";
-        // Nobody reading any more must not stop the program whose output this is.
-        let _ = to.write_all(line.as_bytes());
+        if is_worth_showing(&line) {
+            // Nobody reading any more must not stop the program whose output this is.
+            let _ = to.write_all(line.as_bytes());
+        }
         text += &line;
     }
     text

@@ -6,6 +6,7 @@ use anyhow::{Context, Result, bail, ensure};
 
 use crate::browser;
 use crate::command::{cargo, run, watch};
+use crate::contact_sheet;
 use crate::missing::{self, Missing};
 use crate::package;
 use crate::program;
@@ -44,6 +45,13 @@ pub(crate) fn only_web_page() -> bool {
     let mut steps = Steps::new(in_ci());
     steps.step("the web page", || web::page(&build()?, &out_dir("web")?));
     steps.step("the web page in Firefox", || web::in_firefox(&program()?, &out_dir("firefox")?));
+    steps.finish()
+}
+
+/// All public scenes on one sheet. True if all were drawn or refused as they should be.
+pub(crate) fn contact_sheet() -> bool {
+    let mut steps = Steps::new(in_ci());
+    steps.step("the public scenes", || contact_sheet::draw(&build()?, &out_dir("contact-sheet")?));
     steps.finish()
 }
 
@@ -96,21 +104,43 @@ fn formatting() -> Result<Done> {
 }
 
 fn clippy() -> Result<Done> {
-    run(cargo(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))?;
+    let clippy = ["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"];
+    let (_, success) = watch(cargo(&clippy), || |line: &str| !is_progress(line))?;
+    ensure!(success, "clippy complains");
     Ok(Done::passed(""))
 }
 
 /// Unit, integration and documentation tests. `--show-output` because a passed test's output is hidden
-/// otherwise, and with it the word that it skipped something. This program's own tests pretend to skip, and are
+/// otherwise, and with it the word that it skipped something; what passed is shown in numbers only, and kept in a file. This program's own tests pretend to skip, and are
 /// run by themselves.
 fn cargo_test() -> Result<Done> {
     let product = ["test", "--workspace", "--exclude", "xtask", "--", "--show-output"];
-    let (output, success) = watch(cargo(&product))?;
+    let (output, success) = watch(cargo(&product), || {
+        let mut is_of_success = false;
+        move |line: &str| {
+            is_of_success =
+                is_of_success && !ends_successes(line) || line.starts_with("successes:");
+            !(is_of_success || line.ends_with("... ok\n") || is_progress(line))
+        }
+    })?;
+    std::fs::write(dir_of("tests.log")?, &output).context("cannot keep the tests' output")?;
     let count = Count::of(&output);
     ensure!(success, "`cargo test` failed ({count})");
     ensure!(count.passed > 0, "`cargo test` ran no tests");
     run(cargo(&["test", "--package", "xtask"]))?;
     Ok(Done { skipped: skips(&output), ..Done::passed(count.to_string()) })
+}
+
+/// What a build says of each package while nothing is wrong.
+fn is_progress(line: &str) -> bool {
+    ["Compiling", "Checking", "Downloaded"]
+        .into_iter()
+        .any(|word| line.trim_start().starts_with(word))
+}
+
+/// What follows the output of the tests that have passed.
+fn ends_successes(line: &str) -> bool {
+    line.starts_with("failures:") || line.starts_with("test result: ")
 }
 
 /// Build the program with the features that the tests were built with, so that little is built twice.

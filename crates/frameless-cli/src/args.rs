@@ -1,18 +1,23 @@
 //! What the program can be asked, and the help that teaches it.
 
+mod bench;
+mod light;
+mod open;
 mod serve;
+mod view;
 
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Parser, Subcommand};
-use frameless::{ReconstructionKind, Size, ToneMap};
-use frameless_scene::{AnimationChoice, Pick};
-use frameless_trace::{Integrator, Settings};
+use frameless::{Size, ToneMap};
 
-use crate::failure::Failure;
 use crate::parse;
 
+pub(crate) use bench::{BenchArgs, Benchmark};
+pub(crate) use light::LightArgs;
+pub(crate) use open::{ChoiceArgs, LimitArgs, OpenArgs};
 pub(crate) use serve::ServeArgs;
+pub(crate) use view::{LookArgs, ViewArgs};
 
 const LONG_ABOUT: &str = "\
 Frameless rendering: every sample is one pixel traced at the current time and shown at once.
@@ -64,140 +69,6 @@ pub(crate) enum Command {
     Scenes,
 }
 
-/// Look at a scene in a window while it is being traced
-///
-/// Keys and mouse are explained in the window. Where there is no display, it is served as a web page, as by
-/// `frameless serve`.
-#[derive(ClapArgs)]
-#[command(after_help = "Examples:
-  frameless view
-  frameless view model.glb --rate 900000 --temporal 0.8
-  frameless view fox.glb --animation Run
-  frameless view sphere --sampler change --reconstruction hold
-      the algorithm of 2002
-  frameless view sphere --size 512x384 --screenshot shot.png --after 3")]
-pub(crate) struct ViewArgs {
-    #[command(flatten)]
-    pub(crate) look: LookArgs,
-
-    /// Save the window's picture to this PNG file after --after seconds, and end
-    #[arg(long, value_name = "FILE")]
-    pub(crate) screenshot: Option<PathBuf>,
-
-    /// When to save the screenshot, in seconds after the window has opened
-    #[arg(long, value_name = "SECS", default_value = "3", value_parser = parse::wait_secs)]
-    #[arg(requires = "screenshot")]
-    pub(crate) after: f64,
-}
-
-/// What is looked at, and how it is traced.
-#[derive(ClapArgs)]
-pub(crate) struct LookArgs {
-    /// A glTF file or a built-in scene
-    #[arg(default_value = DEFAULT_SCENE)]
-    pub(crate) scene: String,
-
-    #[command(flatten)]
-    pub(crate) choice: ChoiceArgs,
-
-    /// Who chooses the pixels [default: adaptive]
-    ///
-    /// random: any pixel. permutation: every pixel once, then again. change: where colours have just changed (the
-    /// sketch of 2002). adaptive: what has been uncovered, then moving edges, then where change has been learned to
-    /// be fast.
-    #[arg(long, value_name = "NAME", value_parser = sampler_names())]
-    pub(crate) sampler: Option<String>,
-
-    /// How the picture is made of the samples [default: reproject+relight+antialias]
-    ///
-    /// hold: each pixel shows its newest sample. filter: a mean of the samples around, the younger the heavier.
-    /// reproject: samples move with the surfaces that they hit; it may be followed by +relight (old samples are
-    /// shaded with the present lights), +deep (four samples per pixel) and +antialias (samples add up where nothing
-    /// moves).
-    #[arg(long, value_name = "NAME", value_parser = parse::reconstruction)]
-    pub(crate) reconstruction: Option<ReconstructionKind>,
-
-    /// What the sampler `adaptive` spends its samples on [default: 0.5]
-    ///
-    /// From 0 (spatial: finishing what is there) to 1 (temporal: following what moves).
-    #[arg(long, value_name = "0..1", value_parser = parse::fraction)]
-    pub(crate) temporal: Option<f32>,
-
-    /// Trace a picture of always the same size in pixels, whatever the window's [default: as the window, at most 640x480]
-    #[arg(long, value_name = "WxH", value_parser = parse::size)]
-    pub(crate) size: Option<Size>,
-
-    /// At most so many samples per second [default: as many as the machine can]
-    #[arg(long, value_name = "SAMPLES", value_parser = parse::positive)]
-    pub(crate) rate: Option<f64>,
-
-    /// Begin with this camera of the scene, counted from 0
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(crate) camera: u32,
-
-    /// Brighter (positive) or darker (negative) by so many powers of two
-    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = parse::stops)]
-    #[arg(allow_negative_numbers = true)]
-    pub(crate) exposure: f32,
-
-    /// How what is brighter than white is brought into range: clip, neutral (Khronos PBR Neutral) or aces (as fitted by Hill)
-    #[arg(long, value_name = "NAME", default_value = "clip", value_parser = parse::tone_map)]
-    pub(crate) tone_map: ToneMap,
-
-    #[command(flatten)]
-    pub(crate) light: LightArgs,
-
-    #[command(flatten)]
-    pub(crate) environment: EnvironmentArgs,
-
-    /// Trace with so many threads; 0: one per core
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(crate) threads: usize,
-
-    /// The seed of all random choices
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(crate) seed: u64,
-}
-
-/// Which part of a glTF file.
-#[derive(ClapArgs, Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct ChoiceArgs {
-    /// Show this of the file's scenes: a number from 0, or a name [default: the one that the file names, else its first]
-    #[arg(long = "scene", value_name = "N|NAME")]
-    pub(crate) file_scene: Option<Pick>,
-
-    /// Play this of the file's animations: a number from 0, a name, all or none [default: all at once; the first alone if two
-    /// of them move the same thing]
-    #[arg(long, value_name = "N|NAME|all|none")]
-    pub(crate) animation: Option<AnimationChoice>,
-}
-
-/// The scene of `frameless` without arguments.
-const DEFAULT_SCENE: &str = "sphere";
-
-impl Default for ViewArgs {
-    /// As if `frameless view` had been typed.
-    fn default() -> ViewArgs {
-        let look = LookArgs {
-            scene: DEFAULT_SCENE.into(),
-            choice: ChoiceArgs::default(),
-            sampler: None,
-            reconstruction: None,
-            temporal: None,
-            size: None,
-            rate: None,
-            camera: 0,
-            exposure: 0.0,
-            tone_map: ToneMap::default(),
-            light: LightArgs::default(),
-            environment: EnvironmentArgs::default(),
-            threads: 0,
-            seed: 1,
-        };
-        ViewArgs { look, screenshot: None, after: 3.0 }
-    }
-}
-
 /// Measure algorithms against the ideal picture, or two results against each other
 ///
 /// An EXPERIMENT is a TOML file that names scenes, algorithms and sample rates; `experiments/` has some.
@@ -243,7 +114,7 @@ pub(crate) struct RenderArgs {
     pub(crate) scene: String,
 
     #[command(flatten)]
-    pub(crate) choice: ChoiceArgs,
+    pub(crate) open: OpenArgs,
 
     /// The moment, in seconds of the scene's own time
     #[arg(long, value_name = "SECS", default_value = "0", value_parser = parse::finite)]
@@ -267,80 +138,17 @@ pub(crate) struct RenderArgs {
     #[arg(allow_negative_numbers = true)]
     pub(crate) exposure: f32,
 
-    /// How what is brighter than white is brought into range: clip, neutral (Khronos PBR Neutral) or aces (as fitted by Hill)
-    #[arg(long, value_name = "NAME", default_value = "clip", value_parser = parse::tone_map)]
+    /// How what is brighter than white is brought into range: neutral (Khronos PBR Neutral), agx (as in Blender), aces (as fitted by Hill), or none: it is white
+    #[arg(long, value_name = "NAME", default_value = "neutral", value_parser = parse::tone_map)]
     pub(crate) tone_map: ToneMap,
 
     #[command(flatten)]
     pub(crate) light: LightArgs,
 
-    #[command(flatten)]
-    pub(crate) environment: EnvironmentArgs,
-
     /// Samples per pixel: one at its centre, or so many spread over it
     #[arg(long, value_name = "N", default_value_t = 1)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=65_536))]
     pub(crate) samples: u32,
-}
-
-/// How light is followed.
-#[derive(ClapArgs)]
-pub(crate) struct LightArgs {
-    /// How light is followed
-    ///
-    /// direct: lights seen directly and in mirrors, with hard shadows; without noise. path: light that has bounced any number of
-    /// times, by random paths; noise goes away where the picture rests.
-    #[arg(long, value_name = "NAME", default_value = "direct", value_parser = integrator_names())]
-    pub(crate) integrator: String,
-
-    /// After how many surfaces a path of light ends
-    #[arg(long, value_name = "N", default_value_t = Settings::default().max_depth)]
-    #[arg(value_parser = clap::value_parser!(u32).range(0..=1000))]
-    pub(crate) max_depth: u32,
-}
-
-impl Default for LightArgs {
-    fn default() -> LightArgs {
-        let Settings { integrator, max_depth, .. } = Settings::default();
-        LightArgs { integrator: integrator.name().to_owned(), max_depth }
-    }
-}
-
-impl LightArgs {
-    pub(crate) fn settings(&self) -> Settings {
-        let integrator = Integrator::from_name(&self.integrator).unwrap_or_default();
-        Settings { integrator, max_depth: self.max_depth, ..Settings::default() }
-    }
-}
-
-/// What is far away.
-#[derive(ClapArgs, Debug)]
-pub(crate) struct EnvironmentArgs {
-    /// Light the scene by a Radiance picture (.hdr) of all that is far away, which is seen behind it, too
-    ///
-    /// Latitude and longitude; the middle column is seen along +x. It takes the place of light that is added to files without any.
-    #[arg(long = "env", value_name = "FILE")]
-    pub(crate) file: Option<PathBuf>,
-
-    /// Turn the environment about the vertical, in degrees; positive turns what is along +z towards +x
-    #[arg(long = "env-rotation", value_name = "DEGREES", default_value = "0")]
-    #[arg(value_parser = parse::finite, allow_negative_numbers = true, requires = "file")]
-    pub(crate) rotation_deg: f64,
-
-    /// Multiply the environment's light
-    #[arg(long = "env-strength", value_name = "FACTOR", default_value = "1")]
-    #[arg(value_parser = parse::positive, requires = "file")]
-    pub(crate) strength: f64,
-}
-
-impl Default for EnvironmentArgs {
-    fn default() -> EnvironmentArgs {
-        EnvironmentArgs { file: None, rotation_deg: 0.0, strength: 1.0 }
-    }
-}
-
-fn integrator_names() -> clap::builder::PossibleValuesParser {
-    clap::builder::PossibleValuesParser::new(Integrator::ALL.map(Integrator::name))
 }
 
 /// Trace one pixel and tell every step: the ray, what it hit, each light, the colour
@@ -352,7 +160,7 @@ pub(crate) struct TraceArgs {
     pub(crate) scene: String,
 
     #[command(flatten)]
-    pub(crate) choice: ChoiceArgs,
+    pub(crate) open: OpenArgs,
 
     /// Column and row, counted from the top left
     #[arg(long, value_name = "X,Y", value_parser = parse::pixel)]
@@ -370,9 +178,6 @@ pub(crate) struct TraceArgs {
     /// Which of the scene's cameras, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) camera: u32,
-
-    #[command(flatten)]
-    pub(crate) environment: EnvironmentArgs,
 }
 
 /// Tell what is in a scene: shapes, materials, textures, cameras, lights, motion, and what was ignored
@@ -387,10 +192,9 @@ pub(crate) struct InfoArgs {
 
     #[command(flatten)]
     pub(crate) choice: ChoiceArgs,
-}
 
-fn sampler_names() -> clap::builder::PossibleValuesParser {
-    frameless::SamplerKind::ALL.map(|kind| kind.name()).into()
+    #[command(flatten)]
+    pub(crate) limits: LimitArgs,
 }
 
 #[cfg(test)]
@@ -417,7 +221,7 @@ mod tests {
             (typed.scene, typed.sampler, typed.size, typed.rate, typed.camera),
             (default.scene, default.sampler, default.size, default.rate, default.camera)
         );
-        assert_eq!(typed.choice, default.choice);
+        assert_eq!(typed.open.choice, default.open.choice);
         assert_eq!(
             (typed.reconstruction, typed.temporal),
             (default.reconstruction, default.temporal)
@@ -427,83 +231,4 @@ mod tests {
             (default.exposure, default.tone_map, default.threads, default.seed)
         );
     }
-}
-
-/// Measure how fast this machine runs the loop
-///
-/// Speeds are measured in alternating rounds of one run, and given as medians with the smallest and the
-/// largest round. Close other programs first.
-#[derive(ClapArgs)]
-#[command(after_help = "Examples:
-  frameless bench engine
-  frameless bench engine --scene model.glb --threads 1
-  frameless bench sampler --json")]
-pub(crate) struct BenchArgs {
-    /// What to measure
-    #[arg(value_enum)]
-    pub(crate) what: Benchmark,
-
-    /// A glTF file or a built-in scene [default: sphere; `display` has scenes of its own]
-    #[arg(long)]
-    scene: Option<String>,
-
-    /// Which of the file's animations are played, as for `view`
-    #[arg(long, value_name = "N|NAME|all|none")]
-    animation: Option<AnimationChoice>,
-
-    /// Size of the picture in pixels
-    #[arg(long, value_name = "WxH", default_value = "512x384", value_parser = parse::size)]
-    pub(crate) size: Size,
-
-    /// Threads that trace; 0: one per core
-    #[arg(long, default_value_t = 0)]
-    pub(crate) threads: usize,
-
-    /// How often everything is measured
-    #[arg(long, default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub(crate) rounds: u32,
-
-    /// Length of a measurement in seconds
-    #[arg(long, default_value_t = 0.5, value_parser = parse::positive)]
-    pub(crate) secs: f64,
-
-    /// Print one JSON object, {"rows": [{name, value, min, max, unit, conditions}]}
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-impl BenchArgs {
-    /// What is traced.
-    pub(crate) fn scene(&self) -> &str {
-        self.scene.as_deref().unwrap_or(DEFAULT_SCENE)
-    }
-
-    /// What of it moves.
-    pub(crate) fn choice(&self) -> ChoiceArgs {
-        ChoiceArgs { file_scene: None, animation: self.animation.clone() }
-    }
-
-    /// For benchmarks whose scenes are fixed.
-    ///
-    /// # Errors
-    /// If another is asked for.
-    pub(crate) fn no_scene(&self) -> Result<(), Failure> {
-        match &self.scene {
-            Some(scene) => Err(Failure::bad_input(anyhow::anyhow!(
-                "--scene {scene}: this benchmark has scenes of its own; leave --scene out"
-            ))),
-            None => Ok(()),
-        }
-    }
-}
-
-/// The benchmarks.
-#[derive(Clone, Copy, clap::ValueEnum)]
-pub(crate) enum Benchmark {
-    /// The whole loop on the real clock: samples per second of every sampler
-    Engine,
-    /// The samplers alone: nanoseconds per sample beside the renderer
-    Sampler,
-    /// The picture alone: nanoseconds per pixel of a refresh
-    Display,
 }

@@ -16,7 +16,7 @@ const MIB: f64 = 1_048_576.0;
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     // Warnings stand in the list below.
     logger::silence();
-    let scene = input::scene(&args.scene, &args.choice)?;
+    let scene = input::scene(&args.scene, &args.choice, &args.limits.limits())?;
     Ok(output::print(&describe(&scene))?)
 }
 

@@ -4,32 +4,36 @@ use std::path::Path;
 
 use anyhow::anyhow;
 use frameless_scene::{
-    Animation, AnimationChoice, BUILTIN_NAMES, Choice, Environment, Limits, Scene, load_environment,
+    Animation, AnimationChoice, BUILTIN_NAMES, Choice, Environment, Limits, LoadError, Problem,
+    Scene, load_environment,
 };
+use frameless_session::Opener;
 
-use crate::args::{ChoiceArgs, EnvironmentArgs};
+use crate::args::{ChoiceArgs, LimitArgs, OpenArgs};
 use crate::failure::Failure;
 
-/// The scene of that name, lit by the environment, if one is asked for.
-pub(crate) fn lit_scene(
-    name: &str,
-    choice: &ChoiceArgs,
-    environment: &EnvironmentArgs,
-) -> Result<Scene, Failure> {
-    let mut scene = scene(name, choice)?;
-    if let Some(file) = &environment.file {
-        let picture = load_environment(file, &Limits::default()).map_err(Failure::bad_input)?;
-        // Turned by whole turns, a large angle is the same in single precision.
-        let rotation_rad = (environment.rotation_deg % 360.0).to_radians() as f32;
-        let strength = environment.strength.min(f64::from(f32::MAX)) as f32;
-        scene.light_by(Environment { rotation_rad, strength, ..picture });
-    }
-    Ok(scene)
+/// How the user wants scenes to be opened.
+fn opener(args: &OpenArgs) -> Result<Opener, Failure> {
+    let limits = args.limits.limits();
+    let Some(file) = &args.environment.file else {
+        return Ok(Opener { limits, environment: None });
+    };
+    let picture = load_environment(file, &limits).map_err(refused)?;
+    // Turned by whole turns, a large angle is the same in single precision.
+    let rotation_rad = (args.environment.rotation_deg % 360.0).to_radians() as f32;
+    let strength = args.environment.strength.min(f64::from(f32::MAX)) as f32;
+    Ok(Opener { limits, environment: Some(Environment { rotation_rad, strength, ..picture }) })
+}
+
+/// The scene of that name, lit by the environment, if one is asked for; and how others are opened.
+pub(crate) fn lit_scene(name: &str, args: &OpenArgs) -> Result<(Scene, Opener), Failure> {
+    let opener = opener(args)?;
+    Ok((opener.lit(scene(name, &args.choice, &opener.limits)?), opener))
 }
 
 /// The built-in scene of that name, else the file, of which a part may be chosen. A file in the way of a built-in name is
 /// reached as `./sphere`.
-pub(crate) fn scene(name: &str, choice: &ChoiceArgs) -> Result<Scene, Failure> {
+pub(crate) fn scene(name: &str, choice: &ChoiceArgs, limits: &Limits) -> Result<Scene, Failure> {
     if let Some(scene) = frameless_scene::builtin(name) {
         return whole(scene, choice);
     }
@@ -42,7 +46,19 @@ pub(crate) fn scene(name: &str, choice: &ChoiceArgs) -> Result<Scene, Failure> {
     }
     let animation = choice.animation.clone().unwrap_or_default();
     let choice = Choice { scene: choice.file_scene.clone(), animation };
-    frameless_scene::load_chosen(path, &choice, &Limits::default()).map_err(Failure::bad_input)
+    frameless_scene::load_chosen(path, &choice, limits).map_err(refused)
+}
+
+/// With the flag that raises the limit, if a file is refused because of one.
+fn refused(error: LoadError) -> Failure {
+    let flag = match &error.problem {
+        Problem::Limit { what, .. } => LimitArgs::flag_of(what),
+        _ => None,
+    };
+    match flag {
+        Some(flag) => Failure::bad_input(anyhow!("{error}; {flag} raises it")),
+        None => Failure::bad_input(error),
+    }
 }
 
 /// A built-in scene has no parts; it may be held still.

@@ -44,6 +44,18 @@ pub(crate) fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A number of bytes, such as `512M`: K, M and G are powers of 1024.
+pub(crate) fn bytes(text: &str) -> Result<u64, String> {
+    let (number, power) = match text.char_indices().last() {
+        Some((end, 'K' | 'k')) => (&text[..end], 10),
+        Some((end, 'M' | 'm')) => (&text[..end], 20),
+        Some((end, 'G' | 'g')) => (&text[..end], 30),
+        _ => (text, 0),
+    };
+    let bytes = number.parse::<u64>().ok().and_then(|number| number.checked_mul(1 << power));
+    bytes.ok_or_else(|| "wanted a number of bytes, such as 500000, 512M or 4G".into())
+}
+
 /// A number from 0 to 1.
 pub(crate) fn fraction(text: &str) -> Result<f32, String> {
     match finite(text) {
@@ -54,7 +66,7 @@ pub(crate) fn fraction(text: &str) -> Result<f32, String> {
 
 /// A tone mapping by its name.
 pub(crate) fn tone_map(text: &str) -> Result<ToneMap, String> {
-    ToneMap::from_name(text).ok_or_else(|| "wanted clip, neutral or aces".into())
+    ToneMap::from_name(text).ok_or_else(|| "wanted neutral, agx, aces or none".into())
 }
 
 /// A reconstruction by its name.

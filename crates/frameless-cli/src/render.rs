@@ -15,7 +15,8 @@ use crate::{input, output};
 /// Trace every pixel's centre and write the picture.
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     output::check_png_path(&args.out)?;
-    let scene = input::lit_scene(&args.scene, &args.choice, &args.environment)?;
+    let settings = args.light.settings()?;
+    let (scene, _) = input::lit_scene(&args.scene, &args.open)?;
     let view = ViewSource::Camera(input::camera(&scene, args.camera)?);
 
     let waiting = waiting();
@@ -24,7 +25,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     waiting.set_message(format!("tracing {}×{} pixels", args.size.width, args.size.height));
     let pool = rayon::ThreadPoolBuilder::new().build().context("cannot start threads")?;
     let (secs, size, samples) = (args.time, args.size, args.samples);
-    let still = Still { secs, view, size, settings: args.light.settings(), samples };
+    let still = Still { secs, view, size, settings, samples };
     waiting.set_length(u64::from(size.height));
     waiting.set_style(bar());
     let radiance = frameless_trace::render_still(&world, &still, &pool, || waiting.inc(1));

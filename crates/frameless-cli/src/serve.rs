@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use anyhow::anyhow;
 use frameless::Clock;
-use frameless_scene::{Limits, Scene};
+use frameless_scene::Scene;
 use frameless_session::{Helm, PictureSize, Session};
 use frameless_trace::{CpuTracer, ViewSource, World};
 use frameless_web::{MOST_PIXELS, Options, Scenes, Server, Show, TlsFiles};
@@ -63,15 +63,16 @@ fn show(look: &LookArgs) -> Result<Show<CpuTracer>, Failure> {
             "--size {width}x{height}: a web page shows at most {MOST_PIXELS} pixels, such as 3840x2160"
         )));
     }
-    let scene = Arc::new(view::scene(look)?);
+    let (scene, opener) = view::scene(look)?;
+    let scene = Arc::new(scene);
     let prepare = |scene: &Arc<Scene>| Arc::new(World::new(Arc::clone(scene)));
     let camera = ViewSource::Camera(0);
-    let tracer = CpuTracer::new(prepare(&scene), camera, look.light.settings(), look.threads);
+    let tracer = CpuTracer::new(prepare(&scene), camera, look.light.settings()?, look.threads);
     let size = settings.picture.size_in(FIRST_PLACE);
     Ok(Show {
         session: Session::new(size, Clock::real(), settings, look.seed, tracer)
             .with_refresh_threads(look.threads),
         helm: Helm::new(scene),
-        scenes: Some(Scenes { limits: Limits::default(), prepare: Arc::new(prepare) }),
+        scenes: Some(Scenes { opener, prepare: Arc::new(prepare) }),
     })
 }

@@ -21,7 +21,7 @@ pub(crate) fn run(args: &TraceArgs) -> Result<(), Failure> {
             size.height
         )));
     }
-    let scene = input::lit_scene(&args.scene, &args.choice, &args.environment)?;
+    let (scene, _) = input::lit_scene(&args.scene, &args.open)?;
     let view = ViewSource::Camera(input::camera(&scene, args.camera)?);
     let world = World::new(Arc::new(scene));
     let request = Request::centre(size.index(x, y));

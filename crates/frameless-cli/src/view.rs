@@ -6,6 +6,7 @@ use std::time::Duration;
 use anyhow::anyhow;
 use frameless::SamplerKind;
 use frameless_scene::Scene;
+use frameless_session::Opener;
 use frameless_view::{NoDisplay, PictureSize, Settings, ViewOptions};
 
 use crate::args::{LookArgs, ViewArgs};
@@ -22,9 +23,11 @@ pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
         output::check_png_path(screenshot)?;
     }
     let settings = settings(&args.look)?;
-    let mut options = ViewOptions::new(Arc::new(scene(&args.look)?));
+    let (scene, opener) = scene(&args.look)?;
+    let mut options = ViewOptions::new(Arc::new(scene));
+    options.opener = opener;
     options.settings = settings;
-    options.tracing = args.look.light.settings();
+    options.tracing = args.look.light.settings()?;
     options.threads = args.look.threads;
     options.seed = args.look.seed;
     let Some(screenshot) = &args.screenshot else {
@@ -47,12 +50,12 @@ pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
     Err(Failure::other(anyhow!("{shown} was not written: the window was closed too early")))
 }
 
-/// The scene that is looked at, with the camera that is wanted as its first.
-pub(crate) fn scene(args: &LookArgs) -> Result<Scene, Failure> {
-    let mut scene = input::lit_scene(&args.scene, &args.choice, &args.environment)?;
+/// The scene that is looked at, with the camera that is wanted as its first, and how others are opened.
+pub(crate) fn scene(args: &LookArgs) -> Result<(Scene, Opener), Failure> {
+    let (mut scene, opener) = input::lit_scene(&args.scene, &args.open)?;
     let first = input::camera(&scene, args.camera)?;
     scene.cameras.rotate_left(first as usize);
-    Ok(scene)
+    Ok((scene, opener))
 }
 
 /// Where the sliders stand first.

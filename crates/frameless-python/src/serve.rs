@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use frameless::{Clock, Sampler, SamplerKind};
+use frameless::{Clock, Sampler, SamplerKind, ToneMap};
 use frameless_session::{Helm, PictureSize as Shown, Session, Settings};
 use frameless_web::{MOST_PIXELS, Options, Server, Show, Stopper};
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyTypeError, PyValueError};
@@ -249,6 +249,8 @@ pub(crate) fn start_serving(
         reconstruction: reconstruction_kind(reconstruction)?,
         samples_per_sec: budget.map(|budget| positive("budget", budget)).transpose()?,
         exposure_stops: stops(exposure)?,
+        // A function's colours are shown as it returns them.
+        tone_map: ToneMap::None,
         picture: Shown::Fixed(size.0),
         ..Settings::default()
     };

@@ -33,22 +33,47 @@ pub fn look_at(eye: Vec3, target: Vec3, up: Vec3) -> Affine3A {
     Affine3A { matrix3: basis(backward.into(), up.into()), translation: eye.into() }
 }
 
-/// A view of the whole of `bounds`, three-quarter from the front right and slightly from above.
+/// A view of the whole of `bounds`, three-quarter from the front right and slightly from above; of what is flat, like a sign, from the
+/// front.
 ///
-/// `yfov_rad` is the vertical angle of view in (0, π), `aspect` width / height. The sphere around the box
-/// touches the nearer pair of the picture's borders; a box that is a point is seen from 1 m away.
+/// `yfov_rad` is the vertical angle of view in (0, π), `aspect` width / height. The box reaches almost to the nearest pair of the
+/// picture's borders; a box that is a point is seen from 1 m away.
 pub fn frame_bounds(bounds: Bounds, yfov_rad: f32, aspect: f32) -> View {
-    /// From the middle of the scene towards the camera.
-    const TOWARDS_CAMERA: Vec3 = Vec3::new(0.48, 0.36, 0.8);
-    let half_y = 0.5 * yfov_rad;
-    let half_x = (half_y.tan() * aspect).atan();
-    let radius = bounds.radius();
-    let distance = if radius > 0.0 { radius / half_x.min(half_y).sin() } else { 1.0 };
-    let eye = bounds.centre() + TOWARDS_CAMERA * distance;
+    /// A twentieth of the distance is left free.
+    const MARGIN: f32 = 1.05;
+    let half = 0.5 * bounds.max - 0.5 * bounds.min;
+    let view_from = |distance: f32| {
+        look_at(bounds.centre() + towards_camera(half) * distance, bounds.centre(), Vec3::Y)
+    };
+    let tan_y = (0.5 * yfov_rad).tan();
+    let fitting = fitting_distance(view_from(1.0).matrix3, half, [tan_y * aspect, tan_y]);
+    let distance = if fitting > 0.0 { MARGIN * fitting } else { 1.0 };
     View {
-        world_from_camera: look_at(eye, bounds.centre(), Vec3::Y),
+        world_from_camera: view_from(distance),
         projection: Projection::Perspective { yfov_rad },
     }
+}
+
+/// From the middle of a box of such half sizes towards its camera.
+fn towards_camera(half: Vec3) -> Vec3 {
+    /// Of its larger side: what is thinner is a picture of something.
+    const FLAT: f32 = 0.15;
+    if half.z <= FLAT * half.x.max(half.y) && half.y > FLAT * half.x {
+        Vec3::Z
+    } else {
+        Vec3::new(0.48, 0.36, 0.8)
+    }
+}
+
+/// From how far away all corners of a box are in the picture, for a camera that looks at its middle: the largest
+/// |x| / tan_x + z and |y| / tan_y + z of a corner (x, y, z) in the camera's coordinates.
+fn fitting_distance(world_from_camera: Mat3A, half: Vec3, tan: [f32; 2]) -> f32 {
+    let corner = |signs: Vec3| {
+        let corner = world_from_camera.transpose() * Vec3A::from(signs * half);
+        corner.z + (corner.x.abs() / tan[0]).max(corner.y.abs() / tan[1])
+    };
+    let signs = |i: u32| [0, 1, 2].map(|axis| if i >> axis & 1 == 1 { 1.0 } else { -1.0 });
+    (0..8).map(|i| corner(Vec3::from_array(signs(i)))).fold(0.0, f32::max)
 }
 
 fn rigid(transform: &Affine3A) -> Affine3A {

@@ -257,11 +257,15 @@ fn look_at_looks_there_even_straight_down() {
 
 #[test]
 fn framed_bounds_fit_the_picture() {
-    let bounds = Bounds { min: Vec3::new(-3.0, 0.0, -1.0), max: Vec3::new(5.0, 2.0, 1.0) };
-    for aspect in [0.5, 1.0, 2.4] {
+    let block = Bounds { min: Vec3::new(-3.0, 0.0, -1.0), max: Vec3::new(5.0, 2.0, 1.0) };
+    let sign = Bounds { max: Vec3::new(5.0, 2.0, -0.5), ..block };
+    for (bounds, aspect) in [(block, 0.5), (block, 1.0), (block, 2.4), (sign, 1.0)] {
         let view = frame_bounds(bounds, 0.9, aspect);
         let camera_from_world = view.world_from_camera.inverse();
         let half_y = 0.45f32.tan();
+        let is_frontal = view.world_from_camera.transform_vector3(Vec3::Z) == Vec3::Z;
+        assert_eq!(is_frontal, bounds == sign);
+        let mut nearest_border: f32 = 0.0;
         for corner in 0..8 {
             let pick = |axis: usize| {
                 let far = corner >> axis & 1 == 1;
@@ -270,7 +274,10 @@ fn framed_bounds_fit_the_picture() {
             let p = camera_from_world.transform_point3(Vec3::from_array([0, 1, 2].map(pick)));
             assert!(p.z < 0.0 && (p.y / p.z).abs() <= half_y, "{p}");
             assert!((p.x / p.z).abs() <= half_y * aspect, "{p}");
+            let [x, y] = [p.x / p.z / (half_y * aspect), p.y / p.z / half_y].map(f32::abs);
+            nearest_border = nearest_border.max(x).max(y);
         }
+        assert!(nearest_border > 0.85, "{bounds:?} fills {nearest_border} of the picture");
     }
     let point = Bounds { min: Vec3::ONE, max: Vec3::ONE };
     assert!(frame_bounds(point, 0.9, 1.0).world_from_camera.is_finite());

@@ -26,7 +26,7 @@ mod test_stage;
 pub use camera::FreeCamera;
 pub use command::{Command, Picture, Report, Status, ViewChoice};
 pub use helm::{Helm, Looking};
-pub use load::{Loading, Outcome, open};
+pub use load::{Loading, Opener, Outcome};
 pub use overlay::{Colours, Drawn, Legend};
 pub use pace::Pace;
 pub use render_thread::{Ended, LOOP_THREAD, RenderThread};

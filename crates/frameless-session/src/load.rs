@@ -6,7 +6,45 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread::Builder;
 
-use frameless_scene::{Limits, Scene, builtin};
+use frameless_scene::{Environment, Limits, Scene, builtin};
+
+/// How scenes are opened: how much they may ask for, and the light that all of them get.
+#[derive(Clone, Default)]
+pub struct Opener {
+    /// Of each file.
+    pub limits: Limits,
+    /// Lights every scene that is opened; none: as the file says.
+    pub environment: Option<Environment>,
+}
+
+impl Opener {
+    /// A built-in scene by its name (`./NAME` is a file of that name), or a glTF file.
+    ///
+    /// # Errors
+    /// With what is wrong with the file.
+    pub fn open(&self, name: &str) -> anyhow::Result<Scene> {
+        match builtin(name) {
+            Some(scene) => Ok(self.lit(scene)),
+            None => Ok(self.lit(frameless_scene::load(Path::new(name), &self.limits)?)),
+        }
+    }
+
+    /// What is in a file's bytes, if it names no others.
+    ///
+    /// # Errors
+    /// With what is wrong with the file.
+    pub fn open_bytes(&self, name: &str, bytes: &[u8]) -> anyhow::Result<Scene> {
+        Ok(self.lit(frameless_scene::load_bytes(name, bytes, None, &self.limits)?))
+    }
+
+    /// The scene, lit as all are.
+    pub fn lit(&self, mut scene: Scene) -> Scene {
+        if let Some(environment) = &self.environment {
+            scene.light_by(environment.clone());
+        }
+        scene
+    }
+}
 
 /// A scene being read and prepared in a thread of its own. `W` is a scene made ready for the renderer.
 pub struct Loading<W> {
@@ -30,17 +68,6 @@ pub enum Outcome<W> {
     Ready(Arc<Scene>, W),
     /// Why not, for the user.
     Failed(String),
-}
-
-/// A built-in scene by its name (`./NAME` is a file of that name), or a glTF file.
-///
-/// # Errors
-/// With what is wrong with the file.
-pub fn open(name: &str, limits: &Limits) -> anyhow::Result<Scene> {
-    match builtin(name) {
-        Some(scene) => Ok(scene),
-        None => Ok(frameless_scene::load(Path::new(name), limits)?),
-    }
 }
 
 impl<W: Send + 'static> Loading<W> {
@@ -123,10 +150,31 @@ mod tests {
 
     #[test]
     fn built_in_scenes_have_names_and_files_have_paths() {
-        let limits = Limits::default();
-        assert_eq!(open("sphere", &limits).unwrap().name, "sphere");
-        let missing = open("./sphere", &limits).unwrap_err();
+        let opener = Opener::default();
+        assert_eq!(opener.open("sphere").unwrap().name, "sphere");
+        let missing = opener.open("./sphere").unwrap_err();
         assert!(missing.to_string().contains("./sphere"), "{missing}");
+    }
+
+    #[test]
+    fn every_scene_that_is_opened_gets_the_environment_and_keeps_the_limits() {
+        let environment = Environment {
+            name: "grey".to_owned(),
+            width: 1,
+            height: 1,
+            texels: Arc::new(vec![[0.5; 3]]),
+            rotation_rad: 0.0,
+            strength: 1.0,
+        };
+        let limits = Limits { json_values: 3, ..Limits::default() };
+        let opener = Opener { environment: Some(environment.clone()), limits };
+        assert_eq!(opener.open("sphere").unwrap().environment.as_ref(), Some(&environment));
+        let empty = br#"{"asset": {"version": "2.0"}}"#;
+        let bare =
+            Opener { limits: Limits::default(), ..opener.clone() }.open_bytes("a.gltf", empty);
+        assert_eq!(bare.unwrap().environment.as_ref(), Some(&environment));
+        let refused = opener.open_bytes("a.gltf", empty).unwrap_err().to_string();
+        assert!(refused.contains("limit"), "{refused}");
     }
 
     #[test]

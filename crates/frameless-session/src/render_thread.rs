@@ -140,7 +140,7 @@ fn run<S: Stage>(
 
 #[cfg(test)]
 mod tests {
-    use frameless::{Clock, Size};
+    use frameless::{Clock, Size, ToneMap};
 
     use super::*;
     use crate::command::Picture;
@@ -148,7 +148,8 @@ mod tests {
     use crate::test_stage::Plain;
 
     fn start() -> RenderThread<f32> {
-        let (size, settings) = (Size::new(16, 12), Settings::default());
+        let settings = Settings { tone_map: ToneMap::None, ..Settings::default() };
+        let size = Size::new(16, 12);
         let session = Session::new(size, Clock::real(), settings, 1, Plain::new(1.0));
         RenderThread::start(session, || {}).unwrap()
     }

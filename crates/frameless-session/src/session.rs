@@ -263,7 +263,7 @@ impl Throughput {
 
 #[cfg(test)]
 mod tests {
-    use frameless::SamplerKind;
+    use frameless::{SamplerKind, ToneMap};
 
     use super::*;
     use crate::overlay::Drawn;
@@ -279,7 +279,8 @@ mod tests {
 
     fn white_session_with(reconstruction: ReconstructionKind) -> Session<Plain> {
         let sampler = SamplerKind::Permutation;
-        let settings = Settings { sampler, reconstruction, ..Settings::default() };
+        let tone_map = ToneMap::None;
+        let settings = Settings { sampler, reconstruction, tone_map, ..Settings::default() };
         let clock = Clock::simulated(100_000.0);
         let mut session = Session::new(Size::new(40, 30), clock, settings, 1, Plain::new(1.0));
         run(&mut session, 0.1);

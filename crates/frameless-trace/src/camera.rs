@@ -30,7 +30,8 @@ impl ViewSource {
 pub struct Camera {
     size: Size,
     position: Vec3A,
-    axes: Mat3A,
+    /// To the right, up, and against the direction of view.
+    pub(crate) axes: Mat3A,
     /// Half the picture's width and height: at distance 1 (perspective) or in metres (orthographic).
     half: [f32; 2],
     is_perspective: bool,

@@ -5,7 +5,9 @@ use frameless_scene::View;
 
 use crate::camera::Camera;
 use crate::direct::NoProbe;
+use crate::lens::{self, Lens};
 use crate::moment::Moment;
+use crate::path::numbers_on_lens;
 use crate::traverse::Stack;
 use crate::world::World;
 
@@ -43,20 +45,22 @@ impl Integrator {
 }
 
 /// How samples are traced.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// How light is followed. Default: [`Integrator::Direct`].
     pub integrator: Integrator,
     /// After how many surfaces a path ends: of `direct`, mirrors one after the other, and the last surface is matte; of `path`, all.
     /// Default 4.
     pub max_depth: u32,
+    /// Of `path`: what is not in focus is blurred. Default none: everything is sharp.
+    pub lens: Option<Lens>,
     /// Whether answers carry a [`Surface`] per sample; their `lit` then also tells of lights that are off. Default true.
     pub surfaces: bool,
 }
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { integrator: Integrator::default(), max_depth: 4, surfaces: true }
+        Settings { integrator: Integrator::default(), max_depth: 4, lens: None, surfaces: true }
     }
 }
 
@@ -85,7 +89,15 @@ impl World {
         let (ray, cone) = (camera.ray(request), camera.cone());
         match settings.integrator {
             Integrator::Direct => self.radiance(moment, (ray, cone), settings, stack, &mut NoProbe),
-            Integrator::Path => self.path_radiance(moment, (ray, cone), request, settings, stack),
+            Integrator::Path => match settings.lens {
+                None => self.path_radiance(moment, (ray, cone), request, settings, stack),
+                Some(lens) => {
+                    let through = lens.ray(camera, &ray, numbers_on_lens(request));
+                    let (rgb, surface) =
+                        self.path_radiance(moment, (through, cone), request, settings, stack);
+                    (rgb, lens::in_own_pixel(surface, moment, camera, &ray))
+                }
+            },
         }
     }
 }

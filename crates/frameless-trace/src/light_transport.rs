@@ -11,7 +11,8 @@ use crate::integrator::{Integrator, Settings};
 use crate::test_scenes as scenes;
 use crate::{Still, ViewSource, World, render, render_still, thread_pool};
 
-const PATH: Settings = Settings { integrator: Integrator::Path, max_depth: 300, surfaces: true };
+const PATH: Settings =
+    Settings { integrator: Integrator::Path, max_depth: 300, lens: None, surfaces: true };
 
 fn matte(scene: &mut Scene, base: Vec3, emissive: Vec3) -> u32 {
     let base_color = base.extend(1.0);

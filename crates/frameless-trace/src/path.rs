@@ -110,7 +110,9 @@ impl World {
             let albedo = bsdf.albedo();
             let seen = || point.surface(&hit, albedo, asked.unhindered, asked.lit);
             first.see(self, seen, throughput);
-            if depth == 0 && settings.surfaces && bsdf.is_mirror() {
+            // Through a lens what is seen in a mirror is as blurred as if it were where its image is; it goes with the mirror.
+            let wants_images = settings.surfaces && settings.lens.is_none();
+            if depth == 0 && wants_images && bsdf.is_mirror() {
                 first.look_into_mirror(self, moment, &hit, ray.direction);
             }
             let Some(next) = bsdf.sample(numbers.direction) else { break };
@@ -222,6 +224,7 @@ impl Numbers {
 
     /// For the surface that a path meets after `depth` others.
     fn at(&self, depth: u32) -> AtSurface {
+        // 21 surfaces have sets of their own; one set is left over.
         const TURN: u32 = NUM_DIMENSION_SETS_4D / 3;
         let (set, turn) = (3 * (depth % TURN), depth / TURN);
         let four = |set| sample_4d(self.index, set, mixed(self.seed ^ turn));
@@ -234,6 +237,13 @@ impl Numbers {
     fn chance(&self, depth: u32) -> Chance {
         Chance::By(mixed(self.seed ^ mixed(self.index ^ (depth << 16))))
     }
+}
+
+/// For the place on the lens: the last set of dimensions, which no surface uses.
+pub(crate) fn numbers_on_lens(request: &Request) -> [f32; 2] {
+    let Numbers { index, seed } = Numbers::of(request);
+    let [u, v, ..] = sample_4d(index, NUM_DIMENSION_SETS_4D - 1, seed);
+    [u, v]
 }
 
 /// Every bit of the result depends on every bit of the number ("lowbias32", Wellons 2018).

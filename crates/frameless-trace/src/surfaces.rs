@@ -14,8 +14,10 @@ use crate::integrator::{Integrator, Settings};
 use crate::test_scenes as scenes;
 use crate::{Still, ViewSource, World, render_still, thread_pool};
 
-const DIRECT: Settings = Settings { integrator: Integrator::Direct, max_depth: 8, surfaces: true };
-const PATH: Settings = Settings { integrator: Integrator::Path, max_depth: 30, surfaces: true };
+const DIRECT: Settings =
+    Settings { integrator: Integrator::Direct, max_depth: 8, lens: None, surfaces: true };
+const PATH: Settings =
+    Settings { integrator: Integrator::Path, max_depth: 30, lens: None, surfaces: true };
 
 /// Mean of what comes along a narrow view, over `samples` samples.
 fn looking(scene: &Scene, [eye, target]: [Vec3; 2], settings: Settings, samples: u32) -> Vec3 {

@@ -12,7 +12,8 @@ use frameless_trace::{
 
 const SIZE: Size = Size { width: 64, height: 48 };
 const CAMERA: ViewSource = ViewSource::Camera(0);
-const PATH: Settings = Settings { integrator: Integrator::Path, max_depth: 4, surfaces: true };
+const PATH: Settings =
+    Settings { integrator: Integrator::Path, max_depth: 4, lens: None, surfaces: true };
 
 fn world(name: &str) -> Arc<World> {
     Arc::new(World::new(Arc::new(builtin(name).expect("a built-in scene"))))

@@ -145,8 +145,8 @@ impl App {
     fn open(&mut self, name: String, context: &Context, now_secs: f64) {
         let window = context.clone();
         let wake = move || window.request_repaint();
-        let limits = self.options.limits.clone();
-        let open = move |name: &str| frameless_session::open(name, &limits);
+        let opener = self.options.opener.clone();
+        let open = move |name: &str| opener.open(name);
         let prepare = |scene: &Arc<Scene>| Arc::new(World::new(Arc::clone(scene)));
         match Loading::start(name, open, prepare, wake) {
             Ok(loading) => self.loading = Some(loading),

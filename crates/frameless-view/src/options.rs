@@ -4,9 +4,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use frameless_scene::{Limits, Scene};
-
-use frameless_session::Settings;
+use frameless_scene::Scene;
+use frameless_session::{Opener, Settings};
 
 /// What the window is opened with.
 #[derive(Clone)]
@@ -22,7 +21,7 @@ pub struct ViewOptions {
     /// Of all random choices.
     pub seed: u64,
     /// For files that the user drops on the window or names in its panel.
-    pub limits: Limits,
+    pub opener: Opener,
     /// Where F12 puts pictures.
     pub save_to: PathBuf,
     /// The window's width and height at first, in points.
@@ -42,7 +41,7 @@ impl ViewOptions {
             tracing: frameless_trace::Settings::default(),
             threads: 0,
             seed: 1,
-            limits: Limits::default(),
+            opener: Opener::default(),
             save_to: PathBuf::from("."),
             window: [1280.0, 800.0],
             screenshot_after: None,

@@ -471,7 +471,7 @@ impl<W: Send + 'static> Hub<W> {
     }
 
     fn welcome(&self, client: u32, token: &Secret) -> Told {
-        let upload_bytes = self.scenes.as_ref().map(|scenes| scenes.limits.file_bytes);
+        let upload_bytes = self.scenes.as_ref().map(|scenes| scenes.opener.limits.file_bytes);
         legend::welcome(client, token, upload_bytes, self.settings.own_sampler.is_some())
     }
 

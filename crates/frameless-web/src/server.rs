@@ -110,13 +110,13 @@ impl Server {
     /// If the system has no thread left, or the renderer has stopped.
     pub fn run<S: Stage + Send + 'static>(mut self, mut show: Show<S>) -> anyhow::Result<()> {
         if let Some(scenes) = &mut show.scenes {
-            let (wanted, most) = (self.options.upload_bytes, scenes.limits.file_bytes);
+            let (wanted, most) = (self.options.upload_bytes, scenes.opener.limits.file_bytes);
             if wanted > most {
                 log::warn!(
                     "uploads of {wanted} bytes were allowed, but no scene may have more than {most}: that is the limit"
                 );
             }
-            scenes.limits.file_bytes = most.min(wanted);
+            scenes.opener.limits.file_bytes = most.min(wanted);
         }
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(2)
@@ -126,7 +126,7 @@ impl Server {
             .enable_all()
             .build()
             .context("cannot start the web server's threads")?;
-        let upload_bytes = show.scenes.as_ref().map_or(0, |scenes| scenes.limits.file_bytes);
+        let upload_bytes = show.scenes.as_ref().map_or(0, |scenes| scenes.opener.limits.file_bytes);
         let (hub, thread) = hub::start(show, self.options.rests_after, runtime.handle().clone())?;
         let router = routes::router(Arc::new(self.shared(hub.clone(), upload_bytes)));
         runtime.block_on(self.listen(router, &hub));

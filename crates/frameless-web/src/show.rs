@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use frameless_scene::{Limits, Scene};
-use frameless_session::{Helm, Session, Stage};
+use frameless_scene::Scene;
+use frameless_session::{Helm, Opener, Session, Stage};
 
 /// A session, and the camera on it.
 pub struct Show<S: Stage> {
@@ -17,8 +17,8 @@ pub struct Show<S: Stage> {
 
 /// How other scenes are opened.
 pub struct Scenes<W> {
-    /// For uploads.
-    pub limits: Limits,
+    /// What uploads may ask for, and the light that they get.
+    pub opener: Opener,
     /// A scene made ready for the renderer; called in a thread of its own.
     pub prepare: Prepare<W>,
 }

@@ -2,28 +2,35 @@
 //!
 //! All take linear Rec. 709 RGB ≥ 0, exposed, and give linear Rec. 709 RGB in [0, 1]. Black stays black, and a brighter grey is never darker.
 
+mod agx;
+
+use agx::agx;
+
 /// A tone mapping.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ToneMap {
-    /// What is brighter than white is white, channel by channel: colours as they are, and hard edges around what is too bright.
-    #[default]
-    Clip,
     /// Khronos PBR Neutral: base colours as they are up to 0.76, highlights compressed and desaturated.
+    #[default]
     Neutral,
+    /// AgX by Sobotka, as Blender has it: bright colours turn pale before they turn white, as on film.
+    Agx,
     /// The ACES reference rendering and sRGB output transforms, as fitted by Hill: the contrast of film.
     Aces,
+    /// What is brighter than white is white, channel by channel: colours as they are, and hard edges around what is too bright.
+    None,
 }
 
 impl ToneMap {
     /// All of them.
-    pub const ALL: [ToneMap; 3] = [ToneMap::Clip, ToneMap::Neutral, ToneMap::Aces];
+    pub const ALL: [ToneMap; 4] = [ToneMap::Neutral, ToneMap::Agx, ToneMap::Aces, ToneMap::None];
 
     /// As on the command line and in messages.
     pub fn name(self) -> &'static str {
         match self {
-            ToneMap::Clip => "clip",
             ToneMap::Neutral => "neutral",
+            ToneMap::Agx => "agx",
             ToneMap::Aces => "aces",
+            ToneMap::None => "none",
         }
     }
 
@@ -35,19 +42,22 @@ impl ToneMap {
     /// What it does, in a sentence.
     pub fn explanation(self) -> &'static str {
         match self {
-            ToneMap::Clip => "what is brighter than white is white",
             ToneMap::Neutral => "Khronos PBR Neutral: colours as they are, highlights compressed",
+            ToneMap::Agx => "AgX, as in Blender: bright colours turn pale, as on film",
             ToneMap::Aces => "ACES, fitted by Hill: the contrast of film",
+            ToneMap::None => "what is brighter than white is white",
         }
     }
 
     /// Any finite linear colour to one in [0, 1].
+    #[inline]
     pub(crate) fn apply(self, rgb: [f32; 3]) -> [f32; 3] {
         let rgb = rgb.map(|channel| channel.clamp(0.0, BRIGHTEST));
         match self {
-            ToneMap::Clip => rgb,
             ToneMap::Neutral => neutral(rgb),
+            ToneMap::Agx => agx(rgb),
             ToneMap::Aces => aces(rgb),
+            ToneMap::None => rgb,
         }
         .map(|channel| channel.clamp(0.0, 1.0))
     }
@@ -97,12 +107,14 @@ fn aces(rgb: [f32; 3]) -> [f32; 3] {
         [-0.10208, 1.10813, -0.00605],
         [-0.00327, -0.07276, 1.07602],
     ];
-    let times = |matrix: [[f32; 3]; 3], v: [f32; 3]| {
-        matrix.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
-    };
     let curve =
         |v: f32| (v * (v + 0.0245786) - 0.000090537) / (v * (0.983729 * v + 0.432_951) + 0.238081);
     times(OUT, times(IN, rgb).map(curve))
+}
+
+/// The product of a matrix, by rows, and a column.
+fn times(matrix: [[f32; 3]; 3], v: [f32; 3]) -> [f32; 3] {
+    matrix.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
 #[cfg(test)]
@@ -158,6 +170,9 @@ mod tests {
         // ... and compresses without a step where it begins to.
         let [below, above] = [0.7999, 0.8001].map(|level| ToneMap::Neutral.apply([level; 3])[0]);
         assert!(above - below < 3e-4, "{below} {above}");
+        // AgX leaves middle grey where it is: its curve turns there.
+        let middle = ToneMap::Agx.apply([0.18; 3])[0];
+        assert!((middle - 0.18).abs() < 1e-3, "{middle}");
         // f(1) = 0.6163 for a grey: both matrices leave grey what it is.
         let white = ToneMap::Aces.apply([1.0; 3])[0];
         assert!((white - 0.6193).abs() < 5e-3, "{white}");
@@ -168,6 +183,6 @@ mod tests {
         for map in ToneMap::ALL {
             assert_eq!(ToneMap::from_name(map.name()), Some(map));
         }
-        assert_eq!(ToneMap::from_name("Clip"), None);
+        assert_eq!(ToneMap::from_name("None"), None);
     }
 }

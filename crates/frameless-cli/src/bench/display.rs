@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use frameless::{Clock, Engine, ReconstructionKind, SamplerKind, Time};
+use frameless_scene::Limits;
 use frameless_trace::{CpuTracer, Settings, ViewSource, World};
 
 use super::sampler::RATE;
@@ -38,7 +39,11 @@ pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
         args.size.width, args.size.height, args.rounds, args.secs
     );
     let row = |case: &Case| {
-        let world = Arc::new(World::new(Arc::new(input::scene(case.scene, &Default::default())?)));
+        let world = Arc::new(World::new(Arc::new(input::scene(
+            case.scene,
+            &Default::default(),
+            &Limits::default(),
+        )?)));
         let rounds: Vec<f64> = (0..args.rounds)
             .map(|seed| nanos_per_pixel(&world, case, args, u64::from(seed)))
             .collect();

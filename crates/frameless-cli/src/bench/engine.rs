@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use frameless::{Clock, Engine, SamplerKind};
+use frameless_scene::Limits;
 use frameless_trace::{CpuTracer, Settings, ViewSource, World};
 
 use super::table::Row;
@@ -16,7 +17,11 @@ const WARM_UP_SECS: f64 = 0.2;
 /// Rows `engine.<sampler>_samples_per_sec` and `engine.<sampler>_over_random`, the ratio round by round; and
 /// `engine.update_share`: what bringing the scene to a batch's time takes, of the time from batch to batch.
 pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
-    let world = Arc::new(World::new(Arc::new(input::scene(args.scene(), &args.choice())?)));
+    let world = Arc::new(World::new(Arc::new(input::scene(
+        args.scene(),
+        &args.choice(),
+        &Limits::default(),
+    )?)));
     let mut rates = SamplerKind::ALL.map(|_| Vec::new());
     let mut update_shares = Vec::new();
     for round in 0..args.rounds {

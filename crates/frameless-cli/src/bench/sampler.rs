@@ -7,6 +7,7 @@ use frameless::{
     Batch, Canvas, Clock, Engine, Function, Observation, ReconstructionKind, Request, Sampler,
     SamplerKind, Size, Time, Tracer,
 };
+use frameless_scene::Limits;
 use frameless_trace::{CpuTracer, Settings, ViewSource, World};
 
 use super::table::Row;
@@ -38,7 +39,11 @@ pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
 }
 
 fn in_a_scene(args: &BenchArgs) -> Result<Row, Failure> {
-    let world = Arc::new(World::new(Arc::new(input::scene(args.scene(), &args.choice())?)));
+    let world = Arc::new(World::new(Arc::new(input::scene(
+        args.scene(),
+        &args.choice(),
+        &Limits::default(),
+    )?)));
     let rounds = (0..args.rounds).map(|seed| scene_nanos(&world, args, u64::from(seed)));
     let conditions = format!(
         "{}, {}×{}, 938 samples per batch, adaptive+reproject refreshed 60 times a second, one thread, {} rounds of {} s after \

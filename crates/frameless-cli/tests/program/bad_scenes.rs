@@ -3,10 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use crate::run::frameless;
+use crate::run::frameless_within;
 
 /// Loading and drawing 8×8 pixels of any of these small files; far above what one takes, far below a hang.
 const LIMIT: Duration = Duration::from_secs(2);
+
+/// Memory that may be written to: half a gibibyte, the stacks of all threads included.
+const MEMORY_KIB: u32 = 512 << 10;
 
 struct Expected {
     file: PathBuf,
@@ -34,7 +37,8 @@ fn expected() -> Option<Vec<Expected>> {
 fn verdict(expected: &Expected, out: &Path) -> Option<String> {
     let file = expected.file.to_string_lossy().into_owned();
     let name = expected.file.file_name().unwrap().to_string_lossy().into_owned();
-    let run = frameless(&["render", &file, "--size", "8x8", "-o", &out.to_string_lossy()]);
+    let arguments = ["render", &file, "--size", "8x8", "-o", &out.to_string_lossy()];
+    let run = frameless_within(MEMORY_KIB, &arguments);
     let errors: Vec<&str> = run.err.lines().filter(|line| line.starts_with("error: ")).collect();
     let complaint = match run.code {
         Some(0) if expected.must_be_refused => "drawn, but must be refused",

@@ -49,7 +49,22 @@ pub(crate) fn program<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Command {
 
 /// The program, run to its end.
 pub(crate) fn frameless<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Run {
-    let mut command = program(arguments);
+    ran(program(arguments))
+}
+
+/// The same with no more memory to write to than so many KiB, where the system can be told.
+pub(crate) fn frameless_within<S: AsRef<std::ffi::OsStr>>(memory_kib: u32, arguments: &[S]) -> Run {
+    if !cfg!(target_os = "linux") {
+        return frameless(arguments);
+    }
+    let program = program(arguments);
+    let mut limited = Command::new("sh");
+    limited.args(["-c", &format!("ulimit -d {memory_kib} && exec \"$@\""), "sh"]);
+    limited.arg(program.get_program()).args(program.get_args()).stdin(Stdio::null());
+    ran(limited)
+}
+
+fn ran(mut command: Command) -> Run {
     let start = Instant::now();
     let Output { status, stdout, stderr } = command.output().expect("the program starts");
     Run {

@@ -25,7 +25,7 @@ pub(super) fn add_camera(scene: &mut Scene) {
     if !scene.cameras.is_empty() {
         return;
     }
-    let mut bounds = scene.bounds_at(&scene.state_at(0.0)).unwrap_or(EMPTY);
+    let mut bounds = bounds_in_motion(scene).unwrap_or(EMPTY);
     bounds.min = bounds.min.clamp(-FARTHEST, FARTHEST);
     bounds.max = bounds.max.clamp(-FARTHEST, FARTHEST);
     let centre = bounds.centre();
@@ -40,6 +40,22 @@ pub(super) fn add_camera(scene: &mut Scene) {
     let projection = Projection::Perspective { yfov_rad: YFOV_RAD };
     scene.cameras.push(Camera { name: "added camera".to_owned(), node, projection });
     scene.notes.push("no camera in the file: added one that shows everything".to_owned());
+}
+
+/// Of everything at the begin, and while it moves if that is not much more.
+fn bounds_in_motion(scene: &Scene) -> Option<Bounds> {
+    /// Moments of the animation that are looked at.
+    const MOMENTS: u32 = 8;
+    /// What moves farther is not worth seeing everything else so small.
+    const MOST_GROWTH: f32 = 1.8;
+    let duration = scene.animation.duration_secs;
+    let at = |moment| {
+        scene.bounds_at(&scene.state_at(duration * f64::from(moment) / f64::from(MOMENTS)))
+    };
+    let first = at(0)?;
+    let moments = if duration > 0.0 { MOMENTS } else { 0 };
+    let all = (1..moments).filter_map(at).fold(first, Bounds::union);
+    Some(if all.radius() <= MOST_GROWTH * first.radius() { all } else { first })
 }
 
 /// How notes of added light begin.

@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use anyhow::anyhow;
-use frameless_scene::{BUILTIN_NAMES, Scene, builtin, load_bytes};
-use frameless_session::{Command, Helm, Loading, Outcome};
+use frameless_scene::{BUILTIN_NAMES, Scene};
+use frameless_session::{Command, Helm, Loading, Opener, Outcome};
 use tokio::sync::oneshot;
 
 use super::{Event, Hub, Upload, UploadRefused};
@@ -32,16 +31,19 @@ impl<W: Send + 'static> Hub<W> {
             let text = format!("there is no built-in scene {}", quoted(name));
             return self.roster.notice_to(client, Level::Error, text);
         };
-        if self.scenes.is_none() {
+        let Some(opener) = self.opener() else {
             let text = "this renderer has but its own scene".to_owned();
             return self.roster.notice_to(client, Level::Error, text);
-        }
+        };
         if self.opening.is_some() {
             let text = "another scene is being opened; try again then".to_owned();
             return self.roster.notice_to(client, Level::Error, text);
         }
-        let open = |name: &str| builtin(name).ok_or_else(|| anyhow!("{name}: no such scene"));
-        self.open(name.to_owned(), open, None);
+        self.open(name.to_owned(), move |name| opener.open(name), None);
+    }
+
+    fn opener(&self) -> Option<Opener> {
+        self.scenes.as_ref().map(|scenes| scenes.opener.clone())
     }
 
     /// Who has that token, if it may send a file now.
@@ -68,10 +70,8 @@ impl<W: Send + 'static> Hub<W> {
             answer.send(Err(refused)).ok();
             return;
         }
-        let limits = self.scenes.as_ref().map(|scenes| scenes.limits.clone()).unwrap_or_default();
-        // No folder: a file that names others is refused.
-        let open = move |name: &str| Ok(load_bytes(name, &bytes, None, &limits)?);
-        self.open(name, open, Some(answer));
+        let opener = self.opener().unwrap_or_default();
+        self.open(name, move |name| opener.open_bytes(name, &bytes), Some(answer));
     }
 
     /// While nothing else is being opened.

@@ -7,8 +7,8 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use frameless::{Clock, Size};
-use frameless_scene::{Limits, Scene, builtin};
-use frameless_session::{Helm, PictureSize, Session, Settings, Stage};
+use frameless_scene::{Scene, builtin};
+use frameless_session::{Helm, Opener, PictureSize, Session, Settings, Stage};
 use frameless_trace::{CpuTracer, ViewSource, World};
 use frameless_web::wire::{Ack, StatusMessage, TilesHeader};
 use frameless_web::{Options, Prepare, Scenes, Server, Show, Stopper};
@@ -59,7 +59,7 @@ pub(crate) fn start_with<S: Stage + Send + 'static>(
     let show = Show {
         session: Session::new(size, Clock::real(), settings, 1, stage),
         helm: Helm::new(Arc::new(builtin("sphere").expect("built in"))),
-        scenes: prepare.map(|prepare| Scenes { limits: Limits::default(), prepare }),
+        scenes: prepare.map(|prepare| Scenes { opener: Opener::default(), prepare }),
     };
     let thread = std::thread::spawn(move || server.run(show));
     Running { address, key, stopper, thread: Some(thread) }

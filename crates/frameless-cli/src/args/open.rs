@@ -1,0 +1,151 @@
+//! What is opened: which part of a file, how much it may ask for, and the light around it.
+
+use std::path::PathBuf;
+
+use clap::Args as ClapArgs;
+use frameless_scene::{AnimationChoice, Limits, Pick};
+
+use crate::parse;
+
+/// How a scene is opened.
+#[derive(ClapArgs, Debug, Default)]
+pub(crate) struct OpenArgs {
+    #[command(flatten)]
+    pub(crate) choice: ChoiceArgs,
+
+    #[command(flatten)]
+    pub(crate) environment: EnvironmentArgs,
+
+    #[command(flatten)]
+    pub(crate) limits: LimitArgs,
+}
+
+/// Which part of a glTF file.
+#[derive(ClapArgs, Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct ChoiceArgs {
+    /// Show this of the file's scenes: a number from 0, or a name [default: the one that the file names, else its first]
+    #[arg(long = "scene", value_name = "N|NAME")]
+    pub(crate) file_scene: Option<Pick>,
+
+    /// Play this of the file's animations: a number from 0, a name, all or none [default: all at once; the first alone if two
+    /// of them move the same thing]
+    #[arg(long, value_name = "N|NAME|all|none")]
+    pub(crate) animation: Option<AnimationChoice>,
+}
+
+/// What is far away.
+#[derive(ClapArgs, Debug)]
+pub(crate) struct EnvironmentArgs {
+    /// Light the scene by a Radiance picture (.hdr) of all that is far away, which is seen behind it, too
+    ///
+    /// Latitude and longitude; the middle column is seen along +x. It takes the place of light that is added to files without any.
+    #[arg(long = "env", value_name = "FILE")]
+    pub(crate) file: Option<PathBuf>,
+
+    /// Turn the environment about the vertical, in degrees; positive turns what is along +z towards +x
+    #[arg(long = "env-rotation", value_name = "DEGREES", default_value = "0")]
+    #[arg(value_parser = parse::finite, allow_negative_numbers = true, requires = "file")]
+    pub(crate) rotation_deg: f64,
+
+    /// Multiply the environment's light
+    #[arg(long = "env-strength", value_name = "FACTOR", default_value = "1")]
+    #[arg(value_parser = parse::positive, requires = "file")]
+    pub(crate) strength: f64,
+}
+
+impl Default for EnvironmentArgs {
+    fn default() -> EnvironmentArgs {
+        EnvironmentArgs { file: None, rotation_deg: 0.0, strength: 1.0 }
+    }
+}
+
+/// How much a file may ask for. What it asks for is checked before it is given.
+#[derive(ClapArgs, Debug)]
+#[command(next_help_heading = "Limits of a file")]
+pub(crate) struct LimitArgs {
+    /// Bytes of everything that is decoded: vertices, triangles, keyframes, texels; K, M and G are powers of 1024
+    #[arg(long, value_name = "BYTES", default_value = "4G", value_parser = parse::bytes)]
+    max_memory: u64,
+
+    /// Triangles of all meshes; twice as many vertices
+    #[arg(long, value_name = "N", default_value_t = Limits::default().triangles)]
+    max_triangles: u64,
+
+    /// Pixels of all textures together, and of the environment
+    #[arg(long, value_name = "N", default_value_t = Limits::default().total_pixels)]
+    max_texture_pixels: u64,
+
+    /// Nodes
+    #[arg(long, value_name = "N", default_value_t = Limits::default().nodes)]
+    max_nodes: u64,
+
+    /// Nodes between the scene and its deepest node
+    #[arg(long, value_name = "N", default_value_t = Limits::default().node_depth)]
+    max_nesting: u64,
+
+    /// Meshes at nodes
+    #[arg(long, value_name = "N", default_value_t = Limits::default().instances)]
+    max_instances: u64,
+}
+
+impl Default for LimitArgs {
+    fn default() -> LimitArgs {
+        let Limits { decoded_bytes, triangles, total_pixels, nodes, node_depth, instances, .. } =
+            Limits::default();
+        LimitArgs {
+            max_memory: decoded_bytes,
+            max_triangles: triangles,
+            max_texture_pixels: total_pixels,
+            max_nodes: nodes,
+            max_nesting: node_depth,
+            max_instances: instances,
+        }
+    }
+}
+
+impl LimitArgs {
+    /// The flag that raises the limit of which an error speaks, if there is one.
+    pub(crate) fn flag_of(what: &str) -> Option<&'static str> {
+        Some(match what {
+            "decoded bytes" | "bytes of file" | "keyframes" | "JSON values" => "--max-memory",
+            "triangles" | "vertices" => "--max-triangles",
+            "pixels in one image" | "pixels in all images" => "--max-texture-pixels",
+            "nodes" => "--max-nodes",
+            "levels of nodes" => "--max-nesting",
+            "instances" => "--max-instances",
+            _ => return None,
+        })
+    }
+
+    /// Those that follow from others are raised with them.
+    pub(crate) fn limits(&self) -> Limits {
+        /// No key and no value in a file takes less.
+        const BYTES_PER_VALUE: u64 = 256;
+        let default = Limits::default();
+        Limits {
+            decoded_bytes: self.max_memory,
+            // A file is at most as large as what is in it, but for text.
+            file_bytes: default.file_bytes.max(self.max_memory / 4),
+            triangles: self.max_triangles,
+            vertices: self.max_triangles.saturating_mul(2),
+            image_pixels: default.image_pixels.max(self.max_texture_pixels / 2),
+            total_pixels: self.max_texture_pixels,
+            nodes: self.max_nodes,
+            node_depth: self.max_nesting,
+            instances: self.max_instances,
+            keyframes: default.keyframes.max(self.max_memory / BYTES_PER_VALUE),
+            json_values: default.json_values.max(self.max_memory / BYTES_PER_VALUE),
+            ..default
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_flags_mean_the_librarys_limits() {
+        assert_eq!(LimitArgs::default().limits(), Limits::default());
+    }
+}
