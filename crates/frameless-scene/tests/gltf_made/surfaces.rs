@@ -222,6 +222,17 @@ fn an_image_that_cannot_be_read_is_a_checker() {
 }
 
 #[test]
+fn an_image_of_few_bytes_cannot_fill_memory() {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let flat = image::GrayImage::new(9000, 8000);
+    flat.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    let maker = with_image(&bytes.into_inner());
+    let scene = load_bytes("i.glb", &maker.glb(), None, &Limits::default()).unwrap();
+    assert_eq!((scene.images[0].width, scene.images[0].height), (8, 8));
+    assert!(warns(&scene, "9000 × 8000"), "{:?}", scene.warnings);
+}
+
+#[test]
 fn an_image_file_that_is_missing_is_a_checker_but_one_outside_the_folder_is_refused() {
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"));
     let mut maker = with_image(b"unused");
