@@ -25,6 +25,7 @@ Project chores. Run them from anywhere in the checkout:
   cargo xtask smoke-report   only a small comparison: nothing got worse, and its report opens in a browser
   cargo xtask smoke-web      only the web page: what it must do, in headless Chromium and Firefox
   cargo xtask measure-web    the web page's latency, traffic and cost, in a headless browser; minutes, and a quiet machine
+  cargo xtask measure-scenes real scenes beside Mitsuba 3: samples per second, edits, loading, memory; many minutes, and a quiet machine
   cargo xtask python         only the Python package: wheel, tests, types, reference, examples, notebook
   cargo xtask help           this text
 
@@ -41,6 +42,7 @@ fn main() -> ExitCode {
         ["smoke-report"] => test::only_report(),
         ["smoke-web"] => test::only_web_page(),
         ["measure-web"] => test::measure_web_page(),
+        ["measure-scenes"] => test::measure_scenes(),
         ["python"] => test::only_python(),
         [] | ["help" | "--help" | "-h"] => {
             println!("{HELP}");

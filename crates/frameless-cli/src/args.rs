@@ -1,5 +1,6 @@
 //! What the program can be asked, and the help that teaches it.
 
+mod bench;
 mod serve;
 
 use std::path::PathBuf;
@@ -9,9 +10,9 @@ use frameless::{ReconstructionKind, Size, ToneMap};
 use frameless_scene::{AnimationChoice, Pick};
 use frameless_trace::{Integrator, Settings};
 
-use crate::failure::Failure;
 use crate::parse;
 
+pub(crate) use bench::{BenchArgs, Benchmark};
 pub(crate) use serve::ServeArgs;
 
 const LONG_ABOUT: &str = "\
@@ -427,83 +428,4 @@ mod tests {
             (default.exposure, default.tone_map, default.threads, default.seed)
         );
     }
-}
-
-/// Measure how fast this machine runs the loop
-///
-/// Speeds are measured in alternating rounds of one run, and given as medians with the smallest and the
-/// largest round. Close other programs first.
-#[derive(ClapArgs)]
-#[command(after_help = "Examples:
-  frameless bench engine
-  frameless bench engine --scene model.glb --threads 1
-  frameless bench sampler --json")]
-pub(crate) struct BenchArgs {
-    /// What to measure
-    #[arg(value_enum)]
-    pub(crate) what: Benchmark,
-
-    /// A glTF file or a built-in scene [default: sphere; `display` has scenes of its own]
-    #[arg(long)]
-    scene: Option<String>,
-
-    /// Which of the file's animations are played, as for `view`
-    #[arg(long, value_name = "N|NAME|all|none")]
-    animation: Option<AnimationChoice>,
-
-    /// Size of the picture in pixels
-    #[arg(long, value_name = "WxH", default_value = "512x384", value_parser = parse::size)]
-    pub(crate) size: Size,
-
-    /// Threads that trace; 0: one per core
-    #[arg(long, default_value_t = 0)]
-    pub(crate) threads: usize,
-
-    /// How often everything is measured
-    #[arg(long, default_value_t = 9, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    pub(crate) rounds: u32,
-
-    /// Length of a measurement in seconds
-    #[arg(long, default_value_t = 0.5, value_parser = parse::positive)]
-    pub(crate) secs: f64,
-
-    /// Print one JSON object, {"rows": [{name, value, min, max, unit, conditions}]}
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-impl BenchArgs {
-    /// What is traced.
-    pub(crate) fn scene(&self) -> &str {
-        self.scene.as_deref().unwrap_or(DEFAULT_SCENE)
-    }
-
-    /// What of it moves.
-    pub(crate) fn choice(&self) -> ChoiceArgs {
-        ChoiceArgs { file_scene: None, animation: self.animation.clone() }
-    }
-
-    /// For benchmarks whose scenes are fixed.
-    ///
-    /// # Errors
-    /// If another is asked for.
-    pub(crate) fn no_scene(&self) -> Result<(), Failure> {
-        match &self.scene {
-            Some(scene) => Err(Failure::bad_input(anyhow::anyhow!(
-                "--scene {scene}: this benchmark has scenes of its own; leave --scene out"
-            ))),
-            None => Ok(()),
-        }
-    }
-}
-
-/// The benchmarks.
-#[derive(Clone, Copy, clap::ValueEnum)]
-pub(crate) enum Benchmark {
-    /// The whole loop on the real clock: samples per second of every sampler
-    Engine,
-    /// The samplers alone: nanoseconds per sample beside the renderer
-    Sampler,
-    /// The picture alone: nanoseconds per pixel of a refresh
-    Display,
 }

@@ -95,6 +95,11 @@ impl Emitters {
         Emitters { triangles, up_to, first_of, share_of }
     }
 
+    /// Whether nothing shines.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.triangles.is_empty()
+    }
+
     /// Light from a random point, if it faces `from` at all.
     pub(crate) fn sample(
         &self,

@@ -8,7 +8,7 @@
 //! Unidirectional paths: at every surface point all punctual lights are asked, and one point of what shines ([`Emitters`]); then one
 //! direction is followed ([`Bsdf::sample`]), to the next surface or the sky. What shines is found in both ways, and so is an environment
 //! ([`Surroundings`]), each weighted by how likely it was to find it (Veach and Guibas 1995, "Optimally Combining Sampling Techniques for Monte Carlo Rendering"). So on until the path is ended by Russian roulette or has met
-//! [`Settings::max_depth`] surfaces after the first. The scene's ambient light stands for what is computed here, and is left out.
+//! [`Settings::max_depth`] surfaces after the first; from the last of them nothing is followed, so that light is asked for alone, and weighs 1. The scene's ambient light stands for what is computed here, and is left out.
 //!
 //! Unbiased but for that limit, and for punctual lights behind glass, which are seen straight through it. Lamps and the environment are not:
 //! they are met through it. Surfaces that blend are there with their alpha as probability. What encloses a volume absorbs e^(−σ·way).
@@ -30,6 +30,7 @@ use crate::integrator::Settings;
 use crate::moment::Moment;
 use crate::point::Point;
 use crate::ray::Ray;
+use crate::surroundings::FromAfar;
 #[cfg(doc)]
 use crate::surroundings::Surroundings;
 use crate::texture::Cone;
@@ -98,14 +99,20 @@ impl World {
                 let other = || self.emitters.density_of(self, moment, place, to_light);
                 radiance += density.map_or(1.0, |own| weight(own, other())) * throughput * emissive;
             }
-            let numbers = numbers.at(depth);
+            let is_last = depth == settings.max_depth;
             let mut scattered = Vec3A::ZERO;
             let asked =
                 self.ask_lights(moment, &point, settings, stack, &mut NoProbe, |arriving| {
                     scattered += bsdf.scattered(arriving.to_light) * arriving.irradiance;
                 });
-            scattered += self.ask_emitters(moment, &point, &bsdf, numbers.light, stack);
-            scattered += self.ask_surroundings(moment, &point, &bsdf, numbers.sky, stack);
+            if !self.emitters.is_empty() {
+                let numbers = numbers.light(depth);
+                scattered += self.ask_emitters(moment, &point, &bsdf, is_last, numbers, stack);
+            }
+            if let Some(surroundings) = &self.surroundings {
+                let light = surroundings.sample(numbers.sky(depth));
+                scattered += self.ask_surroundings(moment, &point, &bsdf, is_last, light, stack);
+            }
             radiance += throughput * scattered;
             let albedo = bsdf.albedo();
             let seen = || point.surface(&hit, albedo, asked.unhindered, asked.lit);
@@ -113,7 +120,11 @@ impl World {
             if depth == 0 && settings.surfaces && bsdf.is_mirror() {
                 first.look_into_mirror(self, moment, &hit, ray.direction);
             }
-            let Some(next) = bsdf.sample(numbers.direction) else { break };
+            if is_last {
+                break;
+            }
+            let [choice, u, v, roulette] = numbers.direction(depth);
+            let Some(next) = bsdf.sample([choice, u, v]) else { break };
             // A shading normal may lead to the wrong side of the surface itself.
             if (next.direction.dot(point.geometric_normal) <= 0.0) != next.passes {
                 break;
@@ -121,7 +132,7 @@ impl World {
             throughput *= next.weight;
             if depth >= SAFE_DEPTH {
                 let goes_on = throughput.max_element().min(MOST_LIKELY_ON);
-                if numbers.roulette >= goes_on {
+                if roulette >= goes_on {
                     break;
                 }
                 throughput /= goes_on;
@@ -154,10 +165,10 @@ impl World {
         moment: &Moment,
         point: &Point,
         bsdf: &Bsdf,
-        numbers: [f32; 2],
+        is_last: bool,
+        light: Option<FromAfar>,
         stack: &mut Stack,
     ) -> Vec3A {
-        let light = self.surroundings.as_ref().and_then(|all| all.sample(numbers));
         let Some(light) = light else { return Vec3A::ZERO };
         let scattered = bsdf.scattered(light.direction);
         if scattered == Vec3A::ZERO || light.direction.dot(point.geometric_normal) <= 0.0 {
@@ -165,7 +176,8 @@ impl World {
         }
         let shadow_ray = Ray { origin: point.shadow_origin, direction: light.direction };
         let passes = self.passing(moment, &shadow_ray, f32::INFINITY, false, stack);
-        let weight = weight(light.density, bsdf.density(light.direction));
+        let other = if is_last { 0.0 } else { bsdf.density(light.direction) };
+        let weight = weight(light.density, other);
         passes * scattered * light.radiance * (weight / light.density)
     }
 
@@ -175,6 +187,7 @@ impl World {
         moment: &Moment,
         point: &Point,
         bsdf: &Bsdf,
+        is_last: bool,
         numbers: [f32; 3],
         stack: &mut Stack,
     ) -> Vec3A {
@@ -188,7 +201,8 @@ impl World {
         }
         let shadow_ray = Ray { origin: point.shadow_origin, direction: light.to_light };
         let passes = self.passing(moment, &shadow_ray, NEARLY_THERE, false, stack);
-        let weight = weight(light.density, bsdf.density(direction));
+        let other = if is_last { 0.0 } else { bsdf.density(direction) };
+        let weight = weight(light.density, other);
         passes * scattered * light.radiance * (weight / light.density)
     }
 }
@@ -205,14 +219,6 @@ struct Numbers {
     seed: u32,
 }
 
-/// In [0, 1), for one surface.
-struct AtSurface {
-    direction: [f32; 3],
-    light: [f32; 3],
-    sky: [f32; 2],
-    roulette: f32,
-}
-
 impl Numbers {
     fn of(request: &Request) -> Numbers {
         // The sequence has 2¹⁶ points; then another begins.
@@ -220,14 +226,28 @@ impl Numbers {
         Numbers { index, seed: mixed(mixed(request.pixel) ^ turn) }
     }
 
-    /// For the surface that a path meets after `depth` others.
-    fn at(&self, depth: u32) -> AtSurface {
+    /// In [0, 1), for the direction that a path takes from the surface that it meets after `depth` others: three, and one for roulette.
+    fn direction(&self, depth: u32) -> [f32; 4] {
+        self.four(depth, 0)
+    }
+
+    /// For a point of what shines.
+    fn light(&self, depth: u32) -> [f32; 3] {
+        let [pick, s, t, _] = self.four(depth, 1);
+        [pick, s, t]
+    }
+
+    /// For a direction of the environment.
+    fn sky(&self, depth: u32) -> [f32; 2] {
+        let [s, t, ..] = self.four(depth, 2);
+        [s, t]
+    }
+
+    #[inline]
+    fn four(&self, depth: u32, part: u32) -> [f32; 4] {
         const TURN: u32 = NUM_DIMENSION_SETS_4D / 3;
-        let (set, turn) = (3 * (depth % TURN), depth / TURN);
-        let four = |set| sample_4d(self.index, set, mixed(self.seed ^ turn));
-        let ([choice, u, v, roulette], [pick, s, t, a]) = (four(set), four(set + 1));
-        let [b, ..] = four(set + 2);
-        AtSurface { direction: [choice, u, v], light: [pick, s, t], sky: [a, b], roulette }
+        let (surface, turn) = (depth % TURN, depth / TURN);
+        sample_4d(self.index, 3 * surface + part, mixed(self.seed ^ turn))
     }
 
     /// For the ray that goes there: whether what blends is there.
