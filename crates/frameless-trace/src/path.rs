@@ -56,27 +56,26 @@ impl World {
     ) -> ([f32; 3], Surface) {
         let numbers = Numbers::of(request);
         let (mut radiance, mut throughput) = (Vec3A::ZERO, Vec3A::ONE);
-        let mut first = FirstSurface::default();
+        let mut first = FirstSurface::new(settings.surfaces);
         // Of the direction that the path took last; `None` where no other would have done.
         let mut density = None;
         // Absorption per metre of what the path is inside, if that is known.
         let mut inside = None;
         for depth in 0..=settings.max_depth {
             let chance = numbers.chance(depth);
-            let hit = self.nearest(moment, &ray, chance, stack);
-            let mut met = hit.map(|hit| (hit, Point::new(self, moment, &ray, &hit, cone)));
+            let mut met = self.nearest(moment, &ray, chance, stack);
             if depth == 0
-                && let Some((hit, point)) = &met
-                && self.is_culled(hit, point)
+                && let Some(hit) = &met
+                && self.shows_its_back(moment, &ray, hit)
             {
-                let behind = self.behind_back(moment, &ray, chance, stack);
-                met = behind.map(|hit| (hit, Point::new(self, moment, &ray, &hit, cone)));
+                met = self.behind_back(moment, &ray, chance, stack);
             }
-            let Some((hit, point)) = met else {
+            let Some(hit) = met else {
                 radiance += throughput * self.sky_seen(ray.direction, density);
                 first.see(self, || sky_surface(&ray), throughput);
                 break;
             };
+            let point = Point::new(self, moment, &ray, &hit, cone);
             let material = &self.scene().materials[point.material as usize];
             let way_m = hit.t * ray.direction.length();
             inside = inside.or_else(|| point.behind(material));
@@ -93,7 +92,7 @@ impl World {
             }
             let bsdf = Bsdf::new(&point, -ray.direction.normalize_or_zero());
             let emissive = point.matter.emissive;
-            if emissive != Vec3A::ZERO {
+            if emissive != Vec3A::ZERO && (point.is_front || material.double_sided) {
                 let place = [hit.instance, hit.primitive];
                 let to_light = hit.t * ray.direction;
                 let other = || self.emitters.density_of(self, moment, place, to_light);
@@ -170,14 +169,13 @@ impl World {
         stack: &mut Stack,
     ) -> Vec3A {
         let Some(light) = light else { return Vec3A::ZERO };
-        let scattered = bsdf.scattered(light.direction);
+        let (scattered, density) = bsdf.towards(light.direction);
         if scattered == Vec3A::ZERO || light.direction.dot(point.geometric_normal) <= 0.0 {
             return Vec3A::ZERO;
         }
         let shadow_ray = Ray { origin: point.shadow_origin, direction: light.direction };
         let passes = self.passing(moment, &shadow_ray, f32::INFINITY, false, stack);
-        let other = if is_last { 0.0 } else { bsdf.density(light.direction) };
-        let weight = weight(light.density, other);
+        let weight = if is_last { 1.0 } else { weight(light.density, density) };
         passes * scattered * light.radiance * (weight / light.density)
     }
 
@@ -195,14 +193,16 @@ impl World {
             return Vec3A::ZERO;
         };
         let direction = light.to_light.normalize_or_zero();
-        let scattered = bsdf.scattered(direction);
-        if scattered == Vec3A::ZERO || direction.dot(point.geometric_normal) <= 0.0 {
+        if direction.dot(point.geometric_normal) <= 0.0 {
+            return Vec3A::ZERO;
+        }
+        let (scattered, density) = bsdf.towards(direction);
+        if scattered == Vec3A::ZERO {
             return Vec3A::ZERO;
         }
         let shadow_ray = Ray { origin: point.shadow_origin, direction: light.to_light };
         let passes = self.passing(moment, &shadow_ray, NEARLY_THERE, false, stack);
-        let other = if is_last { 0.0 } else { bsdf.density(direction) };
-        let weight = weight(light.density, other);
+        let weight = if is_last { 1.0 } else { weight(light.density, density) };
         passes * scattered * light.radiance * (weight / light.density)
     }
 }
