@@ -431,7 +431,8 @@ class BuiltinSampler:
 
 @final
 class Scene:
-    """A scene that changes with time, and the renderer for it: direct light, hard shadows, mirrors, on all cores.
+    """A scene that changes with time, and the renderer for it, on all cores: direct light, hard shadows, mirrors; whole pictures by random
+    paths, too.
 
     Made by `Scene.builtin(name)` or `Scene.load(path)`. Any thread may use it.
     """
@@ -439,8 +440,10 @@ class Scene:
     def builtin(name: str) -> Scene:
         """A scene that comes with the package; Scene.names() lists them."""
     @staticmethod
-    def load(path: str | PathLike[str]) -> Scene:
-        """A glTF 2.0 file (.gltf or .glb). Raises OSError if it cannot be read, ValueError if it is not what it should be."""
+    def load(path: str | PathLike[str], environment: str | PathLike[str] | None = None) -> Scene:
+        """A glTF 2.0 file (.gltf or .glb), lit by a Radiance picture (.hdr) of all that is far away, if one is given: latitude and longitude,
+        +x in its middle column. Raises OSError if a file cannot be read, ValueError if it is not what it should be.
+        """
     @staticmethod
     def names() -> list[str]:
         """The scenes that come with the package."""
@@ -464,15 +467,26 @@ class Scene:
     def transforms(self, time: float) -> _Floats32:
         """Where every object is at a time (seconds): world from object, float32, shape (objects, 4, 4). For Session.place."""
     def render(
-        self, size: tuple[int, int], time: float = 0.0, camera: Camera | int | None = None
+        self,
+        size: tuple[int, int],
+        time: float = 0.0,
+        camera: Camera | int | None = None,
+        integrator: str = "direct",
+        samples: int = 1,
+        max_depth: int = 4,
+        first_sample: int = 0,
     ) -> _Floats32:
-        """The whole picture at one moment: linear RGB radiance of pixel centres, float32, shape (height, width, 3).
+        """The whole picture at one moment: linear RGB radiance, float32, shape (height, width, 3).
 
         Parameters:
 
         - `size`: (width, height) in pixels
         - `time`: seconds of the scene
         - `camera`: a Camera, or the number of one of the scene's; default 0
+        - `integrator`: "direct" (lights and mirrors, without noise) or "path" (light that has bounced any number of times, noisy)
+        - `samples`: per pixel; 1: at its centre, more: spread over it, always the same ones
+        - `first_sample`: which of the sequence of samples comes first, so that pictures can be added up
+        - `max_depth`: after how many surfaces besides the first a way of light ends, up to 1000
         """
     def __call__(self, x: _Array, y: _Array, time: float, camera: Camera | None) -> Samples: ...
 

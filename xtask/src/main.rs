@@ -27,6 +27,7 @@ Project chores. Run them from anywhere in the checkout:
   cargo xtask smoke-web      only the web page: what it must do, in headless Chromium and Firefox
   cargo xtask measure-web    the web page's latency, traffic and cost, in a headless browser; minutes, and a quiet machine
   cargo xtask contact-sheet  every public scene on one page, beside what it is known to show; minutes
+  cargo xtask measure-scenes real scenes beside Mitsuba 3: samples per second, edits, loading, memory; many minutes, and a quiet machine
   cargo xtask python         only the Python package: wheel, tests, types, reference, examples, notebook
   cargo xtask help           this text
 
@@ -44,6 +45,7 @@ fn main() -> ExitCode {
         ["smoke-web"] => test::only_web_page(),
         ["measure-web"] => test::measure_web_page(),
         ["contact-sheet"] => test::contact_sheet(),
+        ["measure-scenes"] => test::measure_scenes(),
         ["python"] => test::only_python(),
         [] | ["help" | "--help" | "-h"] => {
             println!("{HELP}");

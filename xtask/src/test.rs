@@ -62,6 +62,13 @@ pub(crate) fn measure_web_page() -> bool {
     steps.finish()
 }
 
+/// Real scenes, beside Mitsuba. True if they could be measured.
+pub(crate) fn measure_scenes() -> bool {
+    let mut steps = Steps::new(in_ci());
+    steps.step("real scenes, measured", || package::measure_scenes(&out_dir("scenes")?));
+    steps.finish()
+}
+
 /// Only the window. True if nothing failed.
 pub(crate) fn only_window() -> bool {
     let mut steps = Steps::new(in_ci());

@@ -1,6 +1,7 @@
 //! `frameless bench`: speeds as ratios against something measured in the same run.
 
 mod display;
+mod edit;
 mod engine;
 mod sampler;
 mod table;
@@ -15,6 +16,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
         Benchmark::Engine => engine::measure(args)?,
         Benchmark::Sampler => sampler::measure(args)?,
         Benchmark::Display => display::measure(args)?,
+        Benchmark::Edit => edit::measure(args)?,
     };
     let text = if args.json { table::json(&rows) } else { table::plain(&rows) };
     Ok(output::print(&text)?)

@@ -25,7 +25,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     waiting.set_message(format!("tracing {}×{} pixels", args.size.width, args.size.height));
     let pool = rayon::ThreadPoolBuilder::new().build().context("cannot start threads")?;
     let (secs, size, samples) = (args.time, args.size, args.samples);
-    let still = Still { secs, view, size, settings, samples };
+    let still = Still { secs, view, size, settings, samples, first_sample: 0 };
     waiting.set_length(u64::from(size.height));
     waiting.set_style(bar());
     let radiance = frameless_trace::render_still(&world, &still, &pool, || waiting.inc(1));

@@ -75,7 +75,8 @@ fn draw(golden: &Golden, scenes: &Path, sky: &Environment) -> Vec<[f32; 3]> {
     }
     let settings = Settings { integrator: golden.integrator, max_depth: 8, ..Settings::default() };
     let Golden { secs, samples, .. } = *golden;
-    let still = Still { secs, view: ViewSource::Camera(0), size: SIZE, settings, samples };
+    let view = ViewSource::Camera(0);
+    let still = Still { secs, view, size: SIZE, settings, samples, first_sample: 0 };
     let radiance = render_still(&World::new(Arc::new(scene)), &still, &thread_pool(0), || ());
     let display = Display::default().with_tone_map(ToneMap::Neutral);
     radiance.into_iter().map(|rgb| display.encode(rgb)).collect()

@@ -4,8 +4,10 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use frameless::{Batch, Pose, Request, Size, Surface, Time, Tracer};
-use frameless_scene::{BUILTIN_NAMES, Limits, State, builtin, load};
-use frameless_trace::{CpuTracer, Ray, Settings, ViewSource, World, render, thread_pool};
+use frameless_scene::{BUILTIN_NAMES, Limits, LoadError, State, builtin, load, load_environment};
+use frameless_trace::{
+    CpuTracer, Integrator, Ray, Settings, Still, ViewSource, World, render_still, thread_pool,
+};
 use glam::{Mat4, Vec3A};
 use numpy::PyArray3;
 use numpy::prelude::*;
@@ -18,7 +20,8 @@ use crate::camera::Camera;
 use crate::interrupt::interruptible;
 use crate::size::PictureSize;
 
-/// A scene that changes with time, and the renderer for it: direct light, hard shadows, mirrors, on all cores.
+/// A scene that changes with time, and the renderer for it, on all cores: direct light, hard shadows, mirrors; whole pictures by random
+/// paths, too.
 ///
 /// Made by `Scene.builtin(name)` or `Scene.load(path)`. Any thread may use it.
 #[pyclass(frozen, module = "frameless")]
@@ -46,6 +49,22 @@ impl Scene {
 
     fn checked_camera(&self, camera: i128) -> PyResult<u32> {
         whole("camera", camera, 0..=self.scene().cameras.len() as u32 - 1)
+    }
+
+    /// A Camera, the number of one of the scene's, or None for the first.
+    fn view(&self, camera: Option<Bound<'_, PyAny>>) -> PyResult<ViewSource> {
+        let Some(camera) = camera else { return Ok(ViewSource::Camera(0)) };
+        if let Ok(camera) = camera.extract::<Camera>() {
+            return Ok(ViewSource::Free(*camera.view()));
+        }
+        match any_size(&camera) {
+            Ok(number) => Ok(ViewSource::Camera(self.checked_camera(number)?)),
+            Err(_) => {
+                let came = camera.repr()?;
+                let message = format!("camera: wanted a Camera or a number, got {came}");
+                Err(PyTypeError::new_err(message))
+            }
+        }
     }
 
     /// What traces places at one time, with or without the interpreter.
@@ -110,6 +129,13 @@ fn request([x, y]: [f32; 2], size: Size) -> Request {
     Request { pixel: size.index(column, row), offset, sample_index: 0 }
 }
 
+fn integrator_named(name: &str) -> PyResult<Integrator> {
+    Integrator::from_name(name).ok_or_else(|| {
+        let known = Integrator::ALL.map(Integrator::name).join("\" or \"");
+        PyValueError::new_err(format!("integrator: wanted \"{known}\", got {name:?}"))
+    })
+}
+
 /// A hit in the world's coordinates: position and normal; of the sky, the direction. What is seen in a plane mirror is where its
 /// image is, behind the mirror.
 fn in_world(
@@ -143,13 +169,23 @@ impl Scene {
         })
     }
 
-    /// A glTF 2.0 file (.gltf or .glb). Raises OSError if it cannot be read, ValueError if it is not what it should be.
+    /// A glTF 2.0 file (.gltf or .glb), lit by a Radiance picture (.hdr) of all that is far away, if one is given: latitude and longitude,
+    /// +x in its middle column. Raises OSError if a file cannot be read, ValueError if it is not what it should be.
     #[staticmethod]
-    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Scene> {
-        if let Err(error) = std::fs::metadata(&path) {
-            return Err(PyOSError::new_err(format!("{}: {error}", path.display())));
+    #[pyo3(signature = (path, environment=None))]
+    fn load(py: Python<'_>, path: PathBuf, environment: Option<PathBuf>) -> PyResult<Scene> {
+        for path in std::iter::once(&path).chain(&environment) {
+            if let Err(error) = std::fs::metadata(path) {
+                return Err(PyOSError::new_err(format!("{}: {error}", path.display())));
+            }
         }
-        let loaded = interruptible(py, move |_| load(&path, &Limits::default()).map(Scene::of))?;
+        let loaded = interruptible(py, move |_| {
+            let mut scene = load(&path, &Limits::default())?;
+            if let Some(path) = environment {
+                scene.light_by(load_environment(&path, &Limits::default())?);
+            }
+            Ok::<Scene, LoadError>(Scene::of(scene))
+        })?;
         loaded.map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
@@ -206,40 +242,40 @@ impl Scene {
         array::column(py, rows.collect()).reshape([self.scene().instances.len(), 4, 4])
     }
 
-    /// The whole picture at one moment: linear RGB radiance of pixel centres, float32, shape (height, width, 3).
+    /// The whole picture at one moment: linear RGB radiance, float32, shape (height, width, 3).
     ///
     /// Parameters:
     ///
     /// - `size`: (width, height) in pixels
     /// - `time`: seconds of the scene
     /// - `camera`: a Camera, or the number of one of the scene's; default 0
-    #[pyo3(signature = (size, time=0.0, camera=None))]
+    /// - `integrator`: "direct" (lights and mirrors, without noise) or "path" (light that has bounced any number of times, noisy)
+    /// - `samples`: per pixel; 1: at its centre, more: spread over it, always the same ones
+    /// - `first_sample`: which of the sequence of samples comes first, so that pictures can be added up
+    /// - `max_depth`: after how many surfaces besides the first a way of light ends, up to 1000
+    #[pyo3(signature = (size, time=0.0, camera=None, integrator="direct", samples=1, max_depth=4, first_sample=0))]
+    #[allow(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn render<'py>(
         &self,
         py: Python<'py>,
         size: PictureSize,
         time: f64,
         camera: Option<Bound<'py, PyAny>>,
+        integrator: &str,
+        #[pyo3(from_py_with = any_size)] samples: i128,
+        #[pyo3(from_py_with = any_size)] max_depth: i128,
+        #[pyo3(from_py_with = any_size)] first_sample: i128,
     ) -> PyResult<Bound<'py, PyArray3<f32>>> {
-        let secs = Scene::checked_secs(time)?;
-        let view = match camera {
-            None => ViewSource::Camera(0),
-            Some(camera) => match camera.extract::<Camera>() {
-                Ok(camera) => ViewSource::Free(*camera.view()),
-                Err(_) => match any_size(&camera) {
-                    Ok(number) => ViewSource::Camera(self.checked_camera(number)?),
-                    Err(_) => {
-                        let came = camera.repr()?;
-                        let message = format!("camera: wanted a Camera or a number, got {came}");
-                        return Err(PyTypeError::new_err(message));
-                    }
-                },
-            },
-        };
+        let integrator = integrator_named(integrator)?;
+        let max_depth = whole("max_depth", max_depth, 0..=1000)?;
+        let settings = Settings { integrator, max_depth, surfaces: false };
+        let samples = whole("samples", samples, 1..=1 << 20)?;
+        let first_sample = whole("first_sample", first_sample, 0..=u32::MAX)?;
+        let (secs, view) = (Scene::checked_secs(time)?, self.view(camera)?);
         let (world, size) = (self.world.clone(), size.0);
-        let picture = interruptible(py, move |_| {
-            render(&world, secs, &view, size, &Settings::default(), &thread_pool(0))
-        })?;
+        let still = Still { secs, view, size, settings, samples, first_sample };
+        let picture =
+            interruptible(py, move |_| render_still(&world, &still, &thread_pool(0), || ()))?;
         array::colours(py, size, picture)
     }
 

@@ -40,7 +40,7 @@ impl Blas {
         boxes: &[Aabb],
         corners: impl Fn(u32) -> [Vec3; 3],
     ) -> Blas {
-        let mut binary = binary_by_clustering(boxes);
+        let mut binary = binary_by_clustering(boxes, MOST_PER_LEAF);
         let mut blas = Blas { nodes: Vec::new(), packs: Vec::new(), bounds: union(boxes) };
         let needed = blas.take(&binary, primitives, &corners);
         if needed > STACK_PER_TREE {
@@ -61,6 +61,55 @@ impl Blas {
         collapse(binary, &mut self.nodes, |members| {
             let first = packs.len();
             packs.extend(members.chunks(4).map(|four| pack(primitives, four, corners)));
+            Child::leaf(first, packs.len() - first)
+        })
+    }
+}
+
+/// A tree over triangles of several instances; no pack has those of two.
+pub(crate) struct Tree {
+    pub(crate) blas: Blas,
+    /// Of each pack.
+    pub(crate) instance: Vec<u32>,
+}
+
+impl Tree {
+    /// `member`: instance and primitive of each box; `corners`: where that triangle is in the instance's coordinates.
+    pub(crate) fn over(
+        boxes: &[Aabb],
+        member: impl Fn(u32) -> (u32, u32),
+        corners: impl Fn(u32, u32) -> [Vec3; 3],
+    ) -> Tree {
+        // Leaves refer to at most four packs, and each triangle may be of another instance.
+        let mut binary = binary_by_clustering(boxes, 4);
+        let blas = Blas { nodes: Vec::new(), packs: Vec::new(), bounds: union(boxes) };
+        let mut tree = Tree { blas, instance: Vec::new() };
+        if tree.take(&binary, &member, &corners) > STACK_PER_TREE {
+            binary = binary_by_median(boxes);
+            tree.take(&binary, &member, &corners);
+        }
+        tree
+    }
+
+    fn take(
+        &mut self,
+        binary: &Bvh2,
+        member: &impl Fn(u32) -> (u32, u32),
+        corners: &impl Fn(u32, u32) -> [Vec3; 3],
+    ) -> usize {
+        let Tree { blas: Blas { nodes, packs, .. }, instance: instances } = self;
+        (packs.clear(), instances.clear());
+        collapse(binary, nodes, |members| {
+            let first = packs.len();
+            let mut members: Vec<(u32, u32)> = members.iter().map(|&m| member(m)).collect();
+            members.sort_unstable();
+            for same in members.chunk_by(|a, b| a.0 == b.0) {
+                let instance = same[0].0;
+                let primitives: Vec<u32> = same.iter().map(|member| member.1).collect();
+                let all: Vec<u32> = (0..primitives.len() as u32).collect();
+                packs.push(pack(&primitives, &all, &|primitive| corners(instance, primitive)));
+                instances.push(instance);
+            }
             Child::leaf(first, packs.len() - first)
         })
     }
@@ -97,9 +146,12 @@ fn pack(primitives: &[u32], members: &[u32], corners: &impl Fn(u32) -> [Vec3; 3]
     pack
 }
 
+/// Two packs.
+const MOST_PER_LEAF: u32 = 8;
+
 /// Parallel locally-ordered clustering with reinsertion; `obvhs`' medium preset, step by step, since its helper
 /// validates the whole tree in debug builds.
-fn binary_by_clustering(boxes: &[Aabb]) -> Bvh2 {
+fn binary_by_clustering(boxes: &[Aabb], most_per_leaf: u32) -> Bvh2 {
     if boxes.len() <= 4 {
         return one_leaf(boxes);
     }
@@ -114,11 +166,7 @@ fn binary_by_clustering(boxes: &[Aabb]) -> Bvh2 {
     let mut optimizer = ReinsertionOptimizer::default();
     let ratio = preset.reinsertion_batch_ratio;
     optimizer.run(&mut binary, ratio, None);
-    leaf_collapser::collapse(
-        &mut binary,
-        preset.max_prims_per_leaf,
-        preset.collapse_traversal_cost,
-    );
+    leaf_collapser::collapse(&mut binary, most_per_leaf, preset.collapse_traversal_cost);
     optimizer.run(
         &mut binary,
         ratio * preset.post_collapse_reinsertion_batch_ratio_multiplier,
@@ -189,7 +237,7 @@ mod tests {
     #[test]
     fn median_splits_never_need_more_stack_than_there_is() {
         let boxes = shrinking(390);
-        let clustered = stack_need(&binary_by_clustering(&boxes));
+        let clustered = stack_need(&binary_by_clustering(&boxes, MOST_PER_LEAF));
         assert!(clustered > STACK_PER_TREE, "{clustered}: the fallback would never be taken");
         let halved = stack_need(&binary_by_median(&boxes));
         assert!(halved <= 7 * 9, "{halved} for 390 boxes");

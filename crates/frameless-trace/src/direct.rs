@@ -85,7 +85,7 @@ impl World {
     ) -> ([f32; 3], Surface) {
         let mut picture = Picture {
             radiance: Vec3A::ZERO,
-            first: FirstSurface::default(),
+            first: FirstSurface::new(settings.surfaces),
             waiting: Vec::new(),
             branches: 0,
         };

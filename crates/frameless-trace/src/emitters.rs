@@ -5,7 +5,7 @@
 //! ```
 //!
 //! The shares are made once, with the mean of a texture wherever on it a triangle lies: where instances are scaled they are not the best
-//! ones, but always right. Spheres, and what deforms, are met by chance only.
+//! ones, but always right. What is single-sided shines from its front. Spheres, and what deforms, are met by chance only.
 
 use frameless_scene::{Geometry, Scene};
 use glam::{Vec3, Vec3A};
@@ -32,6 +32,12 @@ pub(crate) struct Emitters {
 struct Emitter {
     instance: u32,
     primitive: u32,
+    /// In the object.
+    corners: [Vec3A; 3],
+    share: f32,
+    /// Linear RGB; `None` if a texture tells.
+    even: Option<Vec3A>,
+    double_sided: bool,
 }
 
 /// Light from a point on a triangle.
@@ -72,8 +78,15 @@ impl Emitters {
                 let weight = luminance(radiance) * (b - a).cross(c - a).length();
                 share_of.push(weight);
                 if weight > 0.0 && weight.is_finite() {
-                    let (instance, primitive) = (instance as u32, primitive as u32);
-                    triangles.push(Emitter { instance, primitive });
+                    let material = &scene.materials[mesh.triangle_materials[primitive] as usize];
+                    triangles.push(Emitter {
+                        instance: instance as u32,
+                        primitive: primitive as u32,
+                        corners: [a, b, c].map(Vec3A::from),
+                        share: 0.0,
+                        double_sided: material.double_sided,
+                        even: material.emissive_texture.is_none().then(|| material.emissive.into()),
+                    });
                     weights.push(f64::from(weight));
                 }
             }
@@ -92,7 +105,16 @@ impl Emitters {
                 0.0
             };
         });
+        for Emitter { instance, primitive, share, .. } in &mut triangles {
+            let first = first_of[*instance as usize].unwrap_or_default();
+            *share = share_of[(first + *primitive) as usize];
+        }
         Emitters { triangles, up_to, first_of, share_of }
+    }
+
+    /// Whether nothing shines.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.triangles.is_empty()
     }
 
     /// Light from a random point, if it faces `from` at all.
@@ -104,14 +126,20 @@ impl Emitters {
         [pick, u, v]: [f32; 3],
     ) -> Option<FromEmitter> {
         let index = self.up_to.partition_point(|&up_to| up_to <= pick);
-        let emitter = *self.triangles.get(index)?;
-        let Emitter { instance, primitive } = emitter;
-        let [a, b, c] = in_world(world, moment, instance, primitive)?;
+        let &Emitter { instance, primitive, corners, share, even, double_sided } =
+            self.triangles.get(index)?;
+        let world_from_object = &moment.placed(instance).world_from_object;
+        let [a, b, c] = corners.map(|corner| world_from_object.transform_point3a(corner));
         let root = u.sqrt();
         let weights = [1.0 - root, root * (1.0 - v), root * v];
         let to_light = a + weights[1] * (b - a) + weights[2] * (c - a) - from;
-        let density = self.density(instance, primitive, [a, b, c], to_light);
-        let radiance = radiance(world, instance, primitive, weights);
+        // Mirrored, a triangle is wound the other way.
+        let facing = -to_light.dot((b - a).cross(c - a)) * world_from_object.matrix3.determinant();
+        if facing < 0.0 && !double_sided {
+            return None;
+        }
+        let density = density(share, [a, b, c], to_light);
+        let radiance = even.unwrap_or_else(|| radiance(world, instance, primitive, weights));
         let light = FromEmitter { to_light, radiance, density };
         (density > 0.0 && density.is_finite()).then_some(light)
     }
@@ -127,19 +155,19 @@ impl Emitters {
         if self.triangles.is_empty() {
             return 0.0;
         }
-        in_world(world, moment, instance, primitive)
-            .map_or(0.0, |corners| self.density(instance, primitive, corners, to_light))
-    }
-
-    fn density(&self, instance: u32, primitive: u32, corners: [Vec3A; 3], to: Vec3A) -> f32 {
         let Some(first) = self.first_of[instance as usize] else { return 0.0 };
         let share = self.share_of[(first + primitive) as usize];
-        let [a, b, c] = corners;
-        let twice_area = (b - a).cross(c - a);
-        // r² / cosθ' / area = 2 r³ / |to · (b − a)×(c − a)|
-        let r = to.length();
-        share * 2.0 * r * r * r / to.dot(twice_area).abs()
+        in_world(world, moment, instance, primitive)
+            .map_or(0.0, |corners| density(share, corners, to_light))
     }
+}
+
+/// Of a triangle that is drawn with the probability `share`.
+fn density(share: f32, [a, b, c]: [Vec3A; 3], to: Vec3A) -> f32 {
+    let twice_area = (b - a).cross(c - a);
+    // r² / cosθ' / area = 2 r³ / |to · (b − a)×(c − a)|
+    let r = to.length();
+    share * 2.0 * r * r * r / to.dot(twice_area).abs()
 }
 
 /// What a point of a mesh's triangle gives off.

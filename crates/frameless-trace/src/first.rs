@@ -10,17 +10,26 @@ use crate::ray::{Hit, Ray};
 use crate::world::World;
 
 /// Collects it along a path.
-#[derive(Default)]
 pub(crate) struct FirstSurface {
+    is_asked_for: bool,
     found: Option<Surface>,
     /// The mirror in which the next surface is seen.
     mirror: Option<MirrorSide>,
 }
 
 impl FirstSurface {
+    /// Where nobody asks for surfaces, none is made.
+    #[inline(always)]
+    pub(crate) fn new(is_asked_for: bool) -> FirstSurface {
+        FirstSurface { is_asked_for, found: None, mirror: None }
+    }
+
     /// Told of every surface along the path, with the part of its light that reaches the eye.
     #[inline(always)]
     pub(crate) fn see(&mut self, world: &World, seen: impl FnOnce() -> Surface, throughput: Vec3A) {
+        if !self.is_asked_for {
+            return;
+        }
         if let Some(side) = self.mirror.take() {
             let surface = seen();
             let object = world.mirrors.image_of(surface.object, side);
@@ -45,7 +54,11 @@ impl FirstSurface {
     }
 
     /// What was found; a path that met nothing saw the sky along its last ray.
+    #[inline(always)]
     pub(crate) fn surface(self, last: &Ray) -> Surface {
+        if !self.is_asked_for {
+            return Surface::default();
+        }
         self.found.unwrap_or_else(|| sky_surface(last))
     }
 }

@@ -66,6 +66,12 @@ impl World {
         !point.is_front && has_no_back(self, hit)
     }
 
+    /// The same before the point is known.
+    #[inline(always)]
+    pub(crate) fn shows_its_back(&self, moment: &Moment, ray: &Ray, hit: &Hit) -> bool {
+        has_no_back(self, hit) && !Placement::new(self, moment, ray, hit).is_front
+    }
+
     /// What a camera's ray meets that passes backs: seldom asked, since whoever looks at a closed body from outside meets its front first.
     #[cold]
     pub(crate) fn behind_back(

@@ -36,6 +36,7 @@ mod shares;
 mod sheen;
 mod sift;
 mod sphere;
+mod standing;
 mod surroundings;
 mod tangent;
 mod texture;

@@ -28,7 +28,7 @@ fn looking(scene: Scene, eye: Vec3, target: Vec3, samples: u32) -> Vec3 {
     let view = View { world_from_camera, projection: Projection::Perspective { yfov_rad: 1e-3 } };
     let (size, pool) = (Size::new(8, 8), thread_pool(1));
     let (secs, view, samples) = (0.0, ViewSource::Free(view), samples / 64);
-    let still = Still { secs, view, size, settings: PATH, samples };
+    let still = Still { secs, view, size, settings: PATH, samples, first_sample: 0 };
     let image = render_still(&world, &still, &pool, || ());
     image.iter().copied().map(Vec3::from).sum::<Vec3>() / image.len() as f32
 }

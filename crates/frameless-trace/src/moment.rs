@@ -21,6 +21,8 @@ pub struct Moment {
     /// Per deformation of the scene.
     deforming: Vec<Deforming>,
     top: Top,
+    /// Whether what stands still does so now; else it is in `top` like everything else.
+    standing_holds: bool,
     pub(crate) lights: Vec<Light>,
 }
 
@@ -46,7 +48,8 @@ impl Moment {
     #[inline]
     pub(crate) fn targets<'a>(&'a self, world: &'a World) -> Targets<'a> {
         let trees = Trees { rigid: &world.blas, deforming: &self.deforming };
-        Targets { top: &self.top, placed: &self.placed, trees, isa: world.isa }
+        let standing = world.standing.as_ref().filter(|_| self.standing_holds);
+        Targets { top: &self.top, placed: &self.placed, trees, standing, isa: world.isa }
     }
 }
 
@@ -71,6 +74,7 @@ impl World {
             placed: Vec::new(),
             deforming: Vec::new(),
             top: Top::new(),
+            standing_holds: false,
             lights: Vec::new(),
         };
         self.update_moment(secs, &mut moment);
@@ -108,8 +112,10 @@ impl World {
             moved |= deforming.update(self.scene(), index, &moment.state);
         }
         if moved || !same_world {
+            let standing = self.standing.as_ref().filter(|all| all.holds(&moment.placed));
+            moment.standing_holds = standing.is_some();
             let trees = Trees { rigid: &self.blas, deforming: &moment.deforming };
-            moment.top.rebuild(&moment.placed, trees);
+            moment.top.rebuild(&moment.placed, trees, standing);
         }
         // No time equals NaN: what the scene shows by itself at this time is another picture.
         moment.shows = Some((self.id, f64::NAN));

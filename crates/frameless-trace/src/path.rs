@@ -8,7 +8,7 @@
 //! Unidirectional paths: at every surface point all punctual lights are asked, and one point of what shines ([`Emitters`]); then one
 //! direction is followed ([`Bsdf::sample`]), to the next surface or the sky. What shines is found in both ways, and so is an environment
 //! ([`Surroundings`]), each weighted by how likely it was to find it (Veach and Guibas 1995, "Optimally Combining Sampling Techniques for Monte Carlo Rendering"). So on until the path is ended by Russian roulette or has met
-//! [`Settings::max_depth`] surfaces after the first. The scene's ambient light stands for what is computed here, and is left out.
+//! [`Settings::max_depth`] surfaces after the first; from the last of them nothing is followed, so that light is asked for alone, and weighs 1. The scene's ambient light stands for what is computed here, and is left out.
 //!
 //! Unbiased but for that limit, and for punctual lights behind glass, which are seen straight through it. Lamps and the environment are not:
 //! they are met through it. Surfaces that blend are there with their alpha as probability. What encloses a volume absorbs e^(−σ·way).
@@ -30,6 +30,7 @@ use crate::integrator::Settings;
 use crate::moment::Moment;
 use crate::point::Point;
 use crate::ray::Ray;
+use crate::surroundings::FromAfar;
 #[cfg(doc)]
 use crate::surroundings::Surroundings;
 use crate::texture::Cone;
@@ -55,27 +56,26 @@ impl World {
     ) -> ([f32; 3], Surface) {
         let numbers = Numbers::of(request);
         let (mut radiance, mut throughput) = (Vec3A::ZERO, Vec3A::ONE);
-        let mut first = FirstSurface::default();
+        let mut first = FirstSurface::new(settings.surfaces);
         // Of the direction that the path took last; `None` where no other would have done.
         let mut density = None;
         // Absorption per metre of what the path is inside, if that is known.
         let mut inside = None;
         for depth in 0..=settings.max_depth {
             let chance = numbers.chance(depth);
-            let hit = self.nearest(moment, &ray, chance, stack);
-            let mut met = hit.map(|hit| (hit, Point::new(self, moment, &ray, &hit, cone)));
+            let mut met = self.nearest(moment, &ray, chance, stack);
             if depth == 0
-                && let Some((hit, point)) = &met
-                && self.is_culled(hit, point)
+                && let Some(hit) = &met
+                && self.shows_its_back(moment, &ray, hit)
             {
-                let behind = self.behind_back(moment, &ray, chance, stack);
-                met = behind.map(|hit| (hit, Point::new(self, moment, &ray, &hit, cone)));
+                met = self.behind_back(moment, &ray, chance, stack);
             }
-            let Some((hit, point)) = met else {
+            let Some(hit) = met else {
                 radiance += throughput * self.sky_seen(ray.direction, density);
                 first.see(self, || sky_surface(&ray), throughput);
                 break;
             };
+            let point = Point::new(self, moment, &ray, &hit, cone);
             let material = &self.scene().materials[point.material as usize];
             let way_m = hit.t * ray.direction.length();
             inside = inside.or_else(|| point.behind(material));
@@ -92,20 +92,26 @@ impl World {
             }
             let bsdf = Bsdf::new(&point, -ray.direction.normalize_or_zero());
             let emissive = point.matter.emissive;
-            if emissive != Vec3A::ZERO {
+            if emissive != Vec3A::ZERO && (point.is_front || material.double_sided) {
                 let place = [hit.instance, hit.primitive];
                 let to_light = hit.t * ray.direction;
                 let other = || self.emitters.density_of(self, moment, place, to_light);
                 radiance += density.map_or(1.0, |own| weight(own, other())) * throughput * emissive;
             }
-            let numbers = numbers.at(depth);
+            let is_last = depth == settings.max_depth;
             let mut scattered = Vec3A::ZERO;
             let asked =
                 self.ask_lights(moment, &point, settings, stack, &mut NoProbe, |arriving| {
                     scattered += bsdf.scattered(arriving.to_light) * arriving.irradiance;
                 });
-            scattered += self.ask_emitters(moment, &point, &bsdf, numbers.light, stack);
-            scattered += self.ask_surroundings(moment, &point, &bsdf, numbers.sky, stack);
+            if !self.emitters.is_empty() {
+                let numbers = numbers.light(depth);
+                scattered += self.ask_emitters(moment, &point, &bsdf, is_last, numbers, stack);
+            }
+            if let Some(surroundings) = &self.surroundings {
+                let light = surroundings.sample(numbers.sky(depth));
+                scattered += self.ask_surroundings(moment, &point, &bsdf, is_last, light, stack);
+            }
             radiance += throughput * scattered;
             let albedo = bsdf.albedo();
             let seen = || point.surface(&hit, albedo, asked.unhindered, asked.lit);
@@ -115,7 +121,11 @@ impl World {
             if depth == 0 && wants_images && bsdf.is_mirror() {
                 first.look_into_mirror(self, moment, &hit, ray.direction);
             }
-            let Some(next) = bsdf.sample(numbers.direction) else { break };
+            if is_last {
+                break;
+            }
+            let [choice, u, v, roulette] = numbers.direction(depth);
+            let Some(next) = bsdf.sample([choice, u, v]) else { break };
             // A shading normal may lead to the wrong side of the surface itself.
             if (next.direction.dot(point.geometric_normal) <= 0.0) != next.passes {
                 break;
@@ -123,7 +133,7 @@ impl World {
             throughput *= next.weight;
             if depth >= SAFE_DEPTH {
                 let goes_on = throughput.max_element().min(MOST_LIKELY_ON);
-                if numbers.roulette >= goes_on {
+                if roulette >= goes_on {
                     break;
                 }
                 throughput /= goes_on;
@@ -156,18 +166,18 @@ impl World {
         moment: &Moment,
         point: &Point,
         bsdf: &Bsdf,
-        numbers: [f32; 2],
+        is_last: bool,
+        light: Option<FromAfar>,
         stack: &mut Stack,
     ) -> Vec3A {
-        let light = self.surroundings.as_ref().and_then(|all| all.sample(numbers));
         let Some(light) = light else { return Vec3A::ZERO };
-        let scattered = bsdf.scattered(light.direction);
+        let (scattered, density) = bsdf.towards(light.direction);
         if scattered == Vec3A::ZERO || light.direction.dot(point.geometric_normal) <= 0.0 {
             return Vec3A::ZERO;
         }
         let shadow_ray = Ray { origin: point.shadow_origin, direction: light.direction };
         let passes = self.passing(moment, &shadow_ray, f32::INFINITY, false, stack);
-        let weight = weight(light.density, bsdf.density(light.direction));
+        let weight = if is_last { 1.0 } else { weight(light.density, density) };
         passes * scattered * light.radiance * (weight / light.density)
     }
 
@@ -177,6 +187,7 @@ impl World {
         moment: &Moment,
         point: &Point,
         bsdf: &Bsdf,
+        is_last: bool,
         numbers: [f32; 3],
         stack: &mut Stack,
     ) -> Vec3A {
@@ -184,13 +195,16 @@ impl World {
             return Vec3A::ZERO;
         };
         let direction = light.to_light.normalize_or_zero();
-        let scattered = bsdf.scattered(direction);
-        if scattered == Vec3A::ZERO || direction.dot(point.geometric_normal) <= 0.0 {
+        if direction.dot(point.geometric_normal) <= 0.0 {
+            return Vec3A::ZERO;
+        }
+        let (scattered, density) = bsdf.towards(direction);
+        if scattered == Vec3A::ZERO {
             return Vec3A::ZERO;
         }
         let shadow_ray = Ray { origin: point.shadow_origin, direction: light.to_light };
         let passes = self.passing(moment, &shadow_ray, NEARLY_THERE, false, stack);
-        let weight = weight(light.density, bsdf.density(direction));
+        let weight = if is_last { 1.0 } else { weight(light.density, density) };
         passes * scattered * light.radiance * (weight / light.density)
     }
 }
@@ -207,14 +221,6 @@ struct Numbers {
     seed: u32,
 }
 
-/// In [0, 1), for one surface.
-struct AtSurface {
-    direction: [f32; 3],
-    light: [f32; 3],
-    sky: [f32; 2],
-    roulette: f32,
-}
-
 impl Numbers {
     fn of(request: &Request) -> Numbers {
         // The sequence has 2¹⁶ points; then another begins.
@@ -222,15 +228,29 @@ impl Numbers {
         Numbers { index, seed: mixed(mixed(request.pixel) ^ turn) }
     }
 
-    /// For the surface that a path meets after `depth` others.
-    fn at(&self, depth: u32) -> AtSurface {
-        // 21 surfaces have sets of their own; one set is left over.
+    /// In [0, 1), for the direction that a path takes from the surface that it meets after `depth` others: three, and one for roulette.
+    fn direction(&self, depth: u32) -> [f32; 4] {
+        self.four(depth, 0)
+    }
+
+    /// For a point of what shines.
+    fn light(&self, depth: u32) -> [f32; 3] {
+        let [pick, s, t, _] = self.four(depth, 1);
+        [pick, s, t]
+    }
+
+    /// For a direction of the environment.
+    fn sky(&self, depth: u32) -> [f32; 2] {
+        let [s, t, ..] = self.four(depth, 2);
+        [s, t]
+    }
+
+    #[inline]
+    fn four(&self, depth: u32, part: u32) -> [f32; 4] {
+        // 21 surfaces have sets of their own; one set is left over, for the lens.
         const TURN: u32 = NUM_DIMENSION_SETS_4D / 3;
-        let (set, turn) = (3 * (depth % TURN), depth / TURN);
-        let four = |set| sample_4d(self.index, set, mixed(self.seed ^ turn));
-        let ([choice, u, v, roulette], [pick, s, t, a]) = (four(set), four(set + 1));
-        let [b, ..] = four(set + 2);
-        AtSurface { direction: [choice, u, v], light: [pick, s, t], sky: [a, b], roulette }
+        let (surface, turn) = (depth % TURN, depth / TURN);
+        sample_4d(self.index, 3 * surface + part, mixed(self.seed ^ turn))
     }
 
     /// For the ray that goes there: whether what blends is there.

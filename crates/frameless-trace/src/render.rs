@@ -21,8 +21,10 @@ pub struct Still {
     pub size: Size,
     /// How light is followed.
     pub settings: Settings,
-    /// Per pixel, at least 1: the first of its sequence ([`Request::in_sequence`]), spread over the pixel.
+    /// Per pixel, at least 1: so many of its sequence ([`Request::in_sequence`]), spread over the pixel.
     pub samples: u32,
+    /// The number of the first of them, which is usually 0: a picture that others have gone before begins where they ended.
+    pub first_sample: u32,
 }
 
 /// The picture of an ideal renderer that takes no time: every pixel's centre at exactly `secs`. Row-major linear RGB.
@@ -34,7 +36,7 @@ pub fn render(
     settings: &Settings,
     pool: &ThreadPool,
 ) -> Vec<[f32; 3]> {
-    let still = Still { secs, view: *view, size, settings: *settings, samples: 1 };
+    let still = Still { secs, view: *view, size, settings: *settings, samples: 1, first_sample: 0 };
     render_still(world, &still, pool, || ())
 }
 
@@ -55,7 +57,8 @@ pub fn render_still(
             for (x, colour) in (0..).zip(row) {
                 let mut sum = Vec3::ZERO;
                 for k in 0..samples {
-                    let request = Request::in_sequence(size.index(x, y), k);
+                    let number = still.first_sample.wrapping_add(k);
+                    let request = Request::in_sequence(size.index(x, y), number);
                     let (rgb, _) = world.sample(&moment, &camera, &request, &still.settings, stack);
                     sum += Vec3::from(rgb);
                 }

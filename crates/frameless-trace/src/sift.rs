@@ -68,6 +68,12 @@ impl Targets<'_> {
         if !ray.is_traceable() {
             return None;
         }
+        let hit = self
+            .standing
+            .and_then(|standing| standing.sift::<K, ANY>(self.placed, ray, t_max, sieve, stack));
+        if self.top.leaves.is_empty() || (ANY && hit.is_some()) {
+            return hit;
+        }
         let is_for_all = sieve.is_for_all();
         let mut leaves = SiftedInstances::<K, ANY> {
             targets: self,
@@ -78,7 +84,9 @@ impl Targets<'_> {
             kernel: Default::default(),
         };
         let slab = SlabRay::new(ray);
-        walk::<K, ANY>(&self.top.nodes, &slab, t_max, stack, &mut leaves).then_some(leaves.hit)
+        walk::<K, ANY>(&self.top.nodes, &slab, t_max, stack, &mut leaves)
+            .then_some(leaves.hit)
+            .or(hit)
     }
 }
 

@@ -25,7 +25,8 @@ fn looking(scene: &Scene, [eye, target]: [Vec3; 2], settings: Settings, samples:
     let up = if (target - eye).x == 0.0 && (target - eye).z == 0.0 { Vec3::Z } else { Vec3::Y };
     let projection = Projection::Perspective { yfov_rad: 1e-3 };
     let view = ViewSource::Free(View { world_from_camera: look_at(eye, target, up), projection });
-    let still = Still { secs: 0.0, view, size: Size::new(1, 1), settings, samples };
+    let still =
+        Still { secs: 0.0, view, size: Size::new(1, 1), settings, samples, first_sample: 0 };
     Vec3::from(render_still(&world, &still, &thread_pool(1), || ())[0])
 }
 
@@ -367,7 +368,7 @@ fn distant_textures_are_looked_up_in_smaller_copies() {
         let projection = Projection::Perspective { yfov_rad: 0.5 };
         let view = ViewSource::Free(View { world_from_camera, projection });
         let (size, settings) = (Size::new(16, 16), DIRECT);
-        let still = Still { secs: 0.0, view, size, settings, samples: 1 };
+        let still = Still { secs: 0.0, view, size, settings, samples: 1, first_sample: 0 };
         let image = render_still(&world, &still, &thread_pool(1), || ());
         [image[8 * 16 + 8][0], image[6 * 16 + 9][0], image[9 * 16 + 6][0]]
     };

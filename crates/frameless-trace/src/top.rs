@@ -1,5 +1,7 @@
 //! Two levels: a tree over the instances, and in each instance's own space its mesh's tree or a sphere.
 
+use std::sync::OnceLock;
+
 use glam::{Affine3A, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -12,6 +14,7 @@ use crate::kernel::avx2;
 use crate::kernel::{Isa, Kernel, Portable, ShearRay, SlabRay};
 use crate::ray::{Hit, Ray};
 use crate::sphere;
+use crate::standing::Standing;
 use crate::traverse::{Leaves, STACK_PER_TREE, Stack, walk};
 use crate::wide::{Child, Node, collapse};
 
@@ -29,7 +32,7 @@ pub(crate) enum Shape {
 /// The bottom-level BVHs at one moment.
 #[derive(Clone, Copy)]
 pub(crate) struct Trees<'a> {
-    pub(crate) rigid: &'a [Blas],
+    pub(crate) rigid: &'a [OnceLock<Blas>],
     pub(crate) deforming: &'a [Deforming],
 }
 
@@ -39,7 +42,9 @@ impl<'a> Trees<'a> {
     pub(crate) fn of(&self, shape: Shape) -> Option<&'a Blas> {
         match shape {
             Shape::Sphere => None,
-            Shape::Mesh(index) => Some(&self.rigid[index as usize]),
+            Shape::Mesh(index) => {
+                Some(self.rigid[index as usize].get().expect("made before anything is placed"))
+            }
             Shape::Deforming(index) => Some(&self.deforming[index as usize].tree.blas),
         }
     }
@@ -112,11 +117,19 @@ impl Top {
         Top { nodes, boxes, instances, leaves, binary, builder }
     }
 
-    /// Build from scratch: a few µs for a hundred instances.
-    pub(crate) fn rebuild(&mut self, placed: &[Placed], trees: Trees<'_>) {
+    /// Build from scratch: a few µs for a hundred instances. Those of `standing` are left out.
+    pub(crate) fn rebuild(
+        &mut self,
+        placed: &[Placed],
+        trees: Trees<'_>,
+        standing: Option<&Standing>,
+    ) {
         self.boxes.clear();
         self.instances.clear();
         for (instance, placed) in placed.iter().enumerate() {
+            if standing.is_some_and(|standing| standing.has(instance)) {
+                continue;
+            }
             if let Some(bounds) = placed.bounds(trees) {
                 self.boxes.push(bounds);
                 self.instances.push(instance as u32);
@@ -155,6 +168,8 @@ pub(crate) struct Targets<'a> {
     pub(crate) top: &'a Top,
     pub(crate) placed: &'a [Placed],
     pub(crate) trees: Trees<'a>,
+    /// What is not in `top`.
+    pub(crate) standing: Option<&'a Standing>,
     pub(crate) isa: Isa,
 }
 
@@ -200,11 +215,18 @@ impl Targets<'_> {
         if !ray.is_traceable() {
             return None;
         }
+        let hit = self
+            .standing
+            .and_then(|standing| standing.walk::<K, ANY>(self.placed, ray, t_max, stack));
+        if self.top.leaves.is_empty() || (ANY && hit.is_some()) {
+            return hit;
+        }
         let mut instances =
             Instances::<K, ANY> { targets: self, ray, hit: NOTHING, kernel: Default::default() };
         let slab = SlabRay::new(ray);
         walk::<K, ANY>(&self.top.nodes, &slab, t_max, stack, &mut instances)
             .then_some(instances.hit)
+            .or(hit)
     }
 }
 

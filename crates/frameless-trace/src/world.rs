@@ -1,8 +1,8 @@
 //! A scene prepared for tracing.
 
 use std::f32::consts::FRAC_1_PI;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use frameless_scene::{Geometry, Mesh, Scene};
 use glam::Vec3A;
@@ -15,14 +15,17 @@ use crate::holes::may_have_holes;
 use crate::images::Mirrors;
 use crate::kernel::Isa;
 use crate::matter::is_plain;
+use crate::standing::Standing;
 use crate::surroundings::Surroundings;
 use crate::texture::Copies;
 
 /// A [`Scene`] prepared for tracing: what does not change with time. Immutable; share it in an [`Arc`].
 pub struct World {
     scene: Arc<Scene>,
-    /// Per geometry; empty for spheres, and for meshes all of whose instances deform.
-    pub(crate) blas: Vec<Blas>,
+    /// Per geometry; empty for spheres, and for meshes all of whose instances deform. Not made of what is `standing`, until it moves.
+    pub(crate) blas: Vec<OnceLock<Blas>>,
+    /// All that does not move, in one tree.
+    pub(crate) standing: Option<Standing>,
     /// Per deformation of the scene: what its first moment begins with.
     pub(crate) deforming: Vec<Deforming>,
     /// Smaller copies of the scene's pictures.
@@ -51,16 +54,20 @@ impl World {
     pub(crate) fn with_isa(scene: Arc<Scene>, isa: Isa) -> World {
         static WORLDS: AtomicU64 = AtomicU64::new(1);
         let is_rigid = rigid_geometries(&scene);
+        let standing = Standing::new(&scene);
         let blas =
-            scene.geometries.par_iter().zip(is_rigid).map(|(geometry, is_rigid)| match geometry {
-                Geometry::Mesh(mesh) if is_rigid => Blas::new(mesh),
-                _ => Blas::new(&Mesh::default()),
-            });
+            (scene.geometries.par_iter().zip(is_rigid)).map(
+                |(geometry, is_rigid)| match geometry {
+                    Geometry::Mesh(mesh) if is_rigid => Blas::new(mesh).into(),
+                    _ => Blas::new(&Mesh::default()).into(),
+                },
+            );
         let holes: Vec<bool> = scene.geometries.iter().map(|g| has_holes(&scene, g)).collect();
         World {
             has_holes: holes.contains(&true),
             holes,
             blas: blas.collect(),
+            standing,
             deforming: Deforming::all(&scene),
             mirrors: Mirrors::new(&scene),
             emitters: Emitters::new(&scene),

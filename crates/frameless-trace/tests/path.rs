@@ -21,7 +21,7 @@ fn world(name: &str) -> Arc<World> {
 
 /// Display-referred mean of so many samples per pixel, spread evenly.
 fn evenly(world: &World, secs: f64, samples: u32) -> Vec<[f32; 3]> {
-    let still = Still { secs, view: CAMERA, size: SIZE, settings: PATH, samples };
+    let still = Still { secs, view: CAMERA, size: SIZE, settings: PATH, samples, first_sample: 0 };
     let linear = render_still(world, &still, &thread_pool(0), || ());
     linear.into_iter().map(|rgb| Display::default().encode(rgb)).collect()
 }

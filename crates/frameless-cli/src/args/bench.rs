@@ -17,6 +17,7 @@ use crate::parse;
 #[command(after_help = "Examples:
   frameless bench engine
   frameless bench engine --scene model.glb --threads 1
+  frameless bench edit --scene model.glb --object Chair --rounds 3
   frameless bench sampler --json")]
 pub(crate) struct BenchArgs {
     /// What to measure
@@ -30,6 +31,10 @@ pub(crate) struct BenchArgs {
     /// Which of the file's animations are played, as for `view`
     #[arg(long, value_name = "N|NAME|all|none")]
     animation: Option<AnimationChoice>,
+
+    /// Of `edit`: the name of the object that jumps [default: the scene's first]
+    #[arg(long, value_name = "NAME")]
+    object: Option<String>,
 
     /// Size of the picture in pixels
     #[arg(long, value_name = "WxH", default_value = "512x384", value_parser = parse::size)]
@@ -56,6 +61,11 @@ impl BenchArgs {
     /// What is traced.
     pub(crate) fn scene(&self) -> &str {
         self.scene.as_deref().unwrap_or(DEFAULT_SCENE)
+    }
+
+    /// What jumps, if it was named.
+    pub(crate) fn object(&self) -> Option<&str> {
+        self.object.as_deref()
     }
 
     /// What of it moves.
@@ -86,4 +96,6 @@ pub(crate) enum Benchmark {
     Sampler,
     /// The picture alone: nanoseconds per pixel of a refresh
     Display,
+    /// An object jumps by 10 cm: seconds until what it changes is right again, with paths
+    Edit,
 }

@@ -47,8 +47,7 @@ impl Ggx {
         if self.alpha == 0.0 || to_light.z <= 0.0 {
             return 0.0;
         }
-        distribution(self.half(to_light).z, self.alpha)
-            * visibility(to_light.z, self.to_eye.z, self.alpha)
+        self.towards(to_light, self.half(to_light)).0
     }
 
     /// With which [`Ggx::sample`] finds a direction, per solid angle: D G₁(ωₒ) (ωₒ·h) / (n·ωₒ) for the normal, 1 / 4(ωₒ·h) for the
@@ -57,8 +56,15 @@ impl Ggx {
         if self.alpha == 0.0 || to_light.z <= 0.0 {
             return 0.0;
         }
-        let normal = distribution(self.half(to_light).z, self.alpha);
-        normal * masking(self.to_eye.z, self.alpha) / (4.0 * self.to_eye.z)
+        self.towards(to_light, self.half(to_light)).1
+    }
+
+    /// Both, of an interface that is no mirror, for a direction on the side of the eye; `half`: the normal between the two.
+    #[inline]
+    pub(super) fn towards(&self, to_light: Vec3A, half: Vec3A) -> (f32, f32) {
+        let normals = distribution(half.z, self.alpha);
+        let density = normals * masking(self.to_eye.z, self.alpha) / (4.0 * self.to_eye.z);
+        (normals * visibility(to_light.z, self.to_eye.z, self.alpha), density)
     }
 
     /// The normal between two directions.

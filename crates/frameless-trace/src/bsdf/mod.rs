@@ -28,7 +28,7 @@ use std::f32::consts::{FRAC_1_PI, TAU};
 use glam::Vec3A;
 
 use crate::fresnel::{Dielectric, USUAL, refracted, schlick};
-use crate::matter::Matter;
+use crate::matter::{LayersHere, Matter};
 use crate::point::Point;
 use crate::sheen;
 use ggx::{GRAZING, Ggx};
@@ -42,7 +42,7 @@ pub(crate) struct Bsdf {
     metal: Vec3A,
     metallic: f32,
     dielectric: Dielectric,
-    /// 1 / (1 − F̄); 0 where nothing gets below the surface.
+    /// (1 − F(n·ωₒ)) / (1 − F̄), F of the dielectric; 0 where nothing gets below the surface.
     under: f32,
     glass: Option<Glass>,
     coat: Option<Coat>,
@@ -95,11 +95,13 @@ const MATTE: usize = 3;
 
 impl Bsdf {
     /// `to_eye`: unit length, world coordinates.
+    #[inline]
     pub(crate) fn new(point: &Point, to_eye: Vec3A) -> Bsdf {
         Bsdf::of(&point.matter, point.normal, point.is_front, to_eye)
     }
 
     /// `normal`: unit length, world coordinates, on the side of `to_eye`.
+    #[inline(always)]
     fn of(matter: &Matter, normal: Vec3A, is_front: bool, to_eye: Vec3A) -> Bsdf {
         let metallic = matter.metallic.clamp(0.0, 1.0);
         let dielectric = Dielectric::new(matter);
@@ -116,36 +118,55 @@ impl Bsdf {
             fibres: None,
             up_to: [0.0; 4],
         };
-        if let Some(layers) = matter.layers.as_deref() {
-            let transmission = layers.transmission.clamp(0.0, 1.0);
-            let is_inside = layers.refracts && transmission > 0.0 && !is_front;
-            let refracts = layers.refracts;
-            if is_inside {
-                // 1 − F̄ from inside, where a cone of 1/ior² of all directions leads out.
-                bsdf.under *= (layers.ior * layers.ior).min(f32::MAX);
-            }
-            let clear = transmission * bsdf.diffuse;
-            bsdf.diffuse *= 1.0 - transmission;
-            bsdf.glass = (transmission > 0.0).then_some(Glass { clear, refracts, is_inside });
-            let film = Ggx::new(layers.coat_normal, to_eye, layers.coat_roughness);
-            let part = layers.coat.clamp(0.0, 1.0);
-            bsdf.coat = (part > 0.0 && !is_inside).then_some(Coat { film, part });
-            let fibres = Fibres { color: layers.sheen, roughness: layers.sheen_roughness };
-            bsdf.fibres = (layers.sheen != Vec3A::ZERO).then_some(fibres);
+        match matter.layers.as_deref() {
+            None => bsdf.divide_in_two(),
+            Some(layers) => bsdf.add(layers, is_front, to_eye),
         }
-        bsdf.divide();
         bsdf
+    }
+
+    #[inline(never)]
+    fn add(&mut self, layers: &LayersHere, is_front: bool, to_eye: Vec3A) {
+        let transmission = layers.transmission.clamp(0.0, 1.0);
+        let is_inside = layers.refracts && transmission > 0.0 && !is_front;
+        let refracts = layers.refracts;
+        if is_inside {
+            // 1 − F̄ from inside, where a cone of 1/ior² of all directions leads out.
+            self.under *= (layers.ior * layers.ior).min(f32::MAX);
+        }
+        let clear = transmission * self.diffuse;
+        self.diffuse *= 1.0 - transmission;
+        self.glass = (transmission > 0.0).then_some(Glass { clear, refracts, is_inside });
+        let film = Ggx::new(layers.coat_normal, to_eye, layers.coat_roughness);
+        let part = layers.coat.clamp(0.0, 1.0);
+        self.coat = (part > 0.0 && !is_inside).then_some(Coat { film, part });
+        let fibres = Fibres { color: layers.sheen, roughness: layers.sheen_roughness };
+        self.fibres = (layers.sheen != Vec3A::ZERO).then_some(fibres);
+        self.divide();
+    }
+
+    /// Multiplies `under` by what passes on the way to the eye, and [divides](Bsdf::divide) what has no layers.
+    #[inline(always)]
+    fn divide_in_two(&mut self) {
+        let cos = self.base.to_eye.z;
+        let below = 1.0 - self.dielectric_fresnel(cos).max_element();
+        self.under *= below;
+        let [highlight, matte] = [self.fresnel(cos), below * self.diffuse].map(Vec3A::element_sum);
+        let total = highlight + matte;
+        let kept = |lobe: f32| kept(if total > 0.0 { lobe / total } else { 0.0 });
+        let [highlight, matte] = [kept(highlight), kept(matte)];
+        let part = if highlight > 0.0 { highlight / (highlight + matte) } else { 0.0 };
+        self.up_to = [part, part, part, 1.0];
     }
 
     /// Chooses how often each lobe is taken: as much as it scatters of what all do, but none seldom that scatters at all; up to ten times
     /// as often.
     fn divide(&mut self) {
-        const LEAST: f32 = 0.1;
-        const MOST_MORE: f32 = 10.0;
         let cos = self.base.to_eye.z;
         let film = self.coat.as_ref().map_or(0.0, Coat::reflectance);
         let fibres = self.fibres.as_ref().map_or(0.0, |fibres| fibres.lit(cos));
-        let below = Vec3A::ONE - self.dielectric_fresnel(cos).max_element();
+        let below = Vec3A::splat(1.0 - self.dielectric_fresnel(cos).max_element());
+        self.under *= below.x;
         let clear = self.glass.map_or(Vec3A::ZERO, |glass| glass.clear);
         let lobes = [
             (1.0 - film) * self.fresnel(cos).element_sum(),
@@ -154,10 +175,7 @@ impl Bsdf {
             (1.0 - film) * ((below * self.diffuse).element_sum() + 3.0 * fibres),
         ];
         let total: f32 = lobes.iter().sum();
-        let kept = lobes.map(|lobe| {
-            let part = if lobe > 0.0 { lobe / total } else { 0.0 };
-            part.max(LEAST.min(MOST_MORE * part))
-        });
+        let kept = lobes.map(|lobe| kept(if lobe > 0.0 { lobe / total } else { 0.0 }));
         let all: f32 = kept.iter().sum();
         let mut sum = 0.0;
         self.up_to = kept.map(|kept| {
@@ -187,38 +205,56 @@ impl Bsdf {
     }
 
     /// f · cos for light from a direction in the world, on the side of the eye; a mirror's reflection is not in it.
+    #[inline]
     pub(crate) fn scattered(&self, direction: Vec3A) -> Vec3A {
-        let to_light = self.base.local(direction);
-        if to_light.z <= 0.0 {
-            return Vec3A::ZERO;
-        }
-        let (o, i) = (self.base.to_eye.z, to_light.z);
-        let highlight = self.base.value(to_light);
-        let fresnel = self.fresnel(to_light.dot(self.base.half(to_light)));
-        let mut f = fresnel * highlight + self.diffuse * (self.below(o, i) * FRAC_1_PI);
-        if let Some(fibres) = &self.fibres {
-            let below = fibres.dim(o, i);
-            let value = sheen::value(self.base.to_eye, to_light, fibres.roughness);
-            f = below * f + fibres.color * value;
-        }
-        if let Some(coat) = &self.coat {
-            f = coat.under(direction) * f + Vec3A::splat(coat.value(direction));
-        }
-        f * i
+        self.towards(direction).0
     }
 
     /// Probability density, per solid angle, with which [`Bsdf::sample`] finds a direction in the world.
+    #[cfg(test)]
     pub(crate) fn density(&self, direction: Vec3A) -> f32 {
+        self.towards(direction).1
+    }
+
+    /// f · cos and the density.
+    #[inline]
+    pub(crate) fn towards(&self, direction: Vec3A) -> (Vec3A, f32) {
         let to_light = self.base.local(direction);
         if to_light.z <= 0.0 {
-            return 0.0;
+            return (Vec3A::ZERO, 0.0);
         }
-        let matte = self.probability(MATTE) * to_light.z * FRAC_1_PI;
-        let highlight = self.probability(HIGHLIGHT) * self.base.density(to_light);
-        let coat = self.coat.as_ref().map_or(0.0, |coat| {
-            self.probability(COAT) * coat.film.density(coat.film.local(direction))
-        });
-        matte + highlight + coat
+        let i = to_light.z;
+        let mut f = self.diffuse * (self.below(i) * FRAC_1_PI);
+        let mut density = self.probability(MATTE) * i * FRAC_1_PI;
+        // What never reflects has no highlight either.
+        if self.up_to[HIGHLIGHT] > 0.0 && self.base.alpha > 0.0 {
+            let half = self.base.half(to_light);
+            let (value, its_density) = self.base.towards(to_light, half);
+            f += self.fresnel(to_light.dot(half)) * value;
+            density += self.up_to[HIGHLIGHT] * its_density;
+        }
+        if self.has_layers() {
+            self.add_layers(direction, to_light, &mut f, &mut density);
+        }
+        (f * i, density)
+    }
+
+    fn has_layers(&self) -> bool {
+        self.fibres.is_some() || self.coat.is_some()
+    }
+
+    #[inline(never)]
+    fn add_layers(&self, direction: Vec3A, to_light: Vec3A, f: &mut Vec3A, density: &mut f32) {
+        if let Some(fibres) = &self.fibres {
+            let below = fibres.dim(self.base.to_eye.z, to_light.z);
+            let value = sheen::value(self.base.to_eye, to_light, fibres.roughness);
+            *f = below * *f + fibres.color * value;
+        }
+        if let Some(coat) = &self.coat {
+            *f = coat.under(direction) * *f + Vec3A::splat(coat.value(direction));
+            let of_film = coat.film.density(coat.film.local(direction));
+            *density += self.probability(COAT) * of_film;
+        }
     }
 
     /// A direction for three random numbers in [0, 1); `None` where it would go into the surface.
@@ -246,8 +282,8 @@ impl Bsdf {
     }
 
     fn scatter(&self, direction: Vec3A, alpha: f32) -> Option<Scattered> {
-        let density = self.density(direction);
-        let weight = self.scattered(direction) / density;
+        let (scattered, density) = self.towards(direction);
+        let weight = scattered / density;
         let found = Scattered { direction, weight, density: Some(density), alpha, passes: false };
         (density > 0.0 && weight.is_finite()).then_some(found)
     }
@@ -283,11 +319,13 @@ impl Bsdf {
     }
 
     /// F; `cos`: between a direction and the normal that reflects it.
+    #[inline]
     fn fresnel(&self, cos: f32) -> Vec3A {
         let metal = schlick(self.metal, 1.0, cos);
         self.dielectric_fresnel(cos).lerp(metal, self.metallic)
     }
 
+    #[inline]
     fn dielectric_fresnel(&self, cos: f32) -> Vec3A {
         match self.glass {
             Some(Glass { is_inside: true, .. }) => self.dielectric.reflectance_inside(cos),
@@ -296,10 +334,18 @@ impl Bsdf {
     }
 
     /// k.
-    fn below(&self, o: f32, i: f32) -> f32 {
-        let passes = |cos: f32| 1.0 - self.dielectric_fresnel(cos).max_element();
-        passes(o) * passes(i) * self.under
+    #[inline(always)]
+    fn below(&self, i: f32) -> f32 {
+        (1.0 - self.dielectric_fresnel(i).max_element()) * self.under
     }
+}
+
+/// How often a lobe is taken that scatters this part of all: none seldom that scatters at all.
+#[inline(always)]
+fn kept(part: f32) -> f32 {
+    const LEAST: f32 = 0.1;
+    const MOST_MORE: f32 = 10.0;
+    part.max(LEAST.min(MOST_MORE * part))
 }
 
 impl Coat {
