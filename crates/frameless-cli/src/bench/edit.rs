@@ -25,7 +25,7 @@ const JUMP_SECS: f64 = 6.0;
 const WATCHED_SECS: f64 = 4.0;
 const REFRESHES_PER_SEC: f64 = 30.0;
 /// Of the converged pictures before and after, which are made by the same random numbers: what differs is the object.
-const IDEAL_SAMPLES: u32 = 512;
+const IDEAL_SAMPLES: u32 = 256;
 /// In display-referred sRGB: what one sees.
 const CHANGED: f32 = 0.04;
 const RIGHT: f32 = 0.05;
