@@ -3,7 +3,7 @@
 All of it in alternating rounds of one run, given as medians with the smallest and the largest round. Both renderers have the same files,
 Lambertian surfaces, the same light, size, depth and roulette, all cores, and pictures long enough that starting does not count.
 
-Run it with the package built in the release profile: cargo xtask measure-scenes
+Run it: cargo xtask measure-scenes
 """
 
 import argparse
@@ -25,7 +25,6 @@ import numpy as np
 mi: Any = mitsuba
 mi.set_variant("scalar_rgb")
 
-import frameless  # noqa: E402
 import staging  # noqa: E402
 import translate  # noqa: E402
 from gltf import Gltf  # noqa: E402
@@ -40,7 +39,7 @@ SCENES: dict[str, Callable[[Path, str], Gltf]] = {
     "apartment": staging.apartment,
     "bathroom": staging.bathroom,
 }
-EDITED = {"Cornell box": "suzanne.000", "apartment": "Wood_Floor_Dark", "bathroom": "Circle.007"}
+EDITED = {"Cornell box": "suzanne.000", "apartment": "Slate_Light_Tile", "bathroom": "Circle.007"}
 """What is moved."""
 LIGHTS = {"path": "lamp", "direct": "point"}
 
@@ -64,10 +63,12 @@ def theirs(variant: str, gltf: Gltf, integrator: str) -> Callable[[], Any]:
     return render
 
 
-def ours(gltf: Gltf, integrator: str) -> Callable[[], Any]:
-    with tempfile.TemporaryDirectory() as folder:
-        scene = frameless.Scene.load(gltf.save(Path(folder)))
-    return lambda: scene.render(SIZE, integrator=integrator, samples=SAMPLES[integrator], max_depth=DEPTH)
+def ours(program: Path, path: Path, integrator: str) -> tuple[float, float]:
+    """Samples per second, and mean radiance."""
+    command: list[Any] = [program, "bench", "still", "--scene", path, "--integrator", integrator, "--max-depth", str(DEPTH)]
+    command += ["--size", f"{SIZE[0]}x{SIZE[1]}", "--samples", str(SAMPLES[integrator]), "--rounds", "1", "--json"]
+    rate, mean = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)["rows"]
+    return rate["value"], mean["value"]
 
 
 def timed(work: Callable[[], Any]) -> float:
@@ -80,32 +81,33 @@ def spread(values: list[float], digits: int = 2) -> str:
     return f"{statistics.median(values):.{digits}f} ({min(values):.{digits}f}–{max(values):.{digits}f})"
 
 
-def speeds(scenes: Path, rounds: int, variants: list[str]) -> None:
+def speeds(scenes: Path, rounds: int, program: Path, variants: list[str]) -> None:
     print(f"\nM samples/s, {SIZE[0]}x{SIZE[1]}, matte surfaces, {rounds} alternating rounds")
     print(f"{'':24}{'frameless':>20}" + "".join(f"{variant:>22}{'ratio':>20}" for variant in variants))
     for integrator, lit_by in LIGHTS.items():
         for name, stage in SCENES.items():
             gltf = stage(scenes, lit_by)
             staging.make_matte(gltf)
-            contenders = {"frameless": ours(gltf, integrator)}
-            contenders |= {variant: theirs(variant, gltf, integrator) for variant in variants}
-            agree([contender() for contender in contenders.values()], name)
-            rates: dict[str, list[float]] = {contender: [] for contender in contenders}
-            for _ in range(rounds):
-                for contender, render in contenders.items():
-                    rates[contender].append(SIZE[0] * SIZE[1] * SAMPLES[integrator] / timed(render) * 1e-6)
-            own, line = rates["frameless"], f"{integrator + ', ' + name:24}{spread(rates['frameless']):>20}"
-            for variant in variants:
-                ratios = [a / b for a, b in zip(own, rates[variant], strict=True)]
-                line += f"{spread(rates[variant]):>22}{spread(ratios):>20}"
-            print(line, flush=True)
+            with saved(gltf) as path:
+                print(f"{integrator + ', ' + name:24}" + against(gltf, path, rounds, program, integrator, variants), flush=True)
 
 
-def agree(pictures: list[Any], name: str) -> None:
+def against(gltf: Gltf, path: Path, rounds: int, program: Path, integrator: str, variants: list[str]) -> str:
     """Who renders something else is not compared."""
-    means = [float(np.mean(picture)) for picture in pictures]
+    others = {variant: theirs(variant, gltf, integrator) for variant in variants}
+    means = [ours(program, path, integrator)[1]] + [float(np.mean(render())) for render in others.values()]
     if max(means) > 1.03 * min(means) or not min(means) > 0.0:
-        raise ValueError(f"{name}: mean radiances {means} are not those of one scene")
+        raise ValueError(f"{path}: mean radiances {means} are not those of one scene")
+    own: list[float] = []
+    rates: dict[str, list[float]] = {variant: [] for variant in variants}
+    for _ in range(rounds):
+        own.append(ours(program, path, integrator)[0] * 1e-6)
+        for variant, render in others.items():
+            rates[variant].append(SIZE[0] * SIZE[1] * SAMPLES[integrator] / timed(render) * 1e-6)
+    line = f"{spread(own):>20}"
+    for variant in variants:
+        line += f"{spread(rates[variant]):>22}{spread([a / b for a, b in zip(own, rates[variant], strict=True)]):>20}"
+    return line
 
 
 def edits(scenes: Path, rounds: int, program: Path) -> None:
@@ -183,7 +185,7 @@ def main() -> None:
     load = os.getloadavg()[0]
     print(f"{os.cpu_count()} processors, load before {load:.2f}, Mitsuba {mi.__version__}")
     if given.only in (None, "speeds"):
-        speeds(given.scenes, given.rounds, variants())
+        speeds(given.scenes, given.rounds, given.program, variants())
     if given.only in (None, "loading"):
         loading(given.scenes, given.rounds, given.program)
     if given.only in (None, "edits"):

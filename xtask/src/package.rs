@@ -59,19 +59,9 @@ fn build(out: &Path) -> Result<Done> {
             "the Python package: the packages of {REQUIREMENTS} could not be installed: {error:#}"
         )));
     }
-    let wheel = install_wheel(out, "dev")?;
-    // Whether the compiled half keeps to what its tag promises.
-    let mut audit = python();
-    said(audit.args(["-m", "abi3audit", "--strict"]).arg(&wheel), CHECKS_WITHIN)?;
-    let bytes = wheel.metadata()?.len();
-    Ok(Done::passed(format!("{} MB", bytes / 1_000_000)))
-}
-
-/// Makes the wheel in a profile, and installs it; returns where it is.
-fn install_wheel(out: &Path, profile: &str) -> Result<PathBuf> {
     let mut maturin = python();
     maturin.current_dir(in_project("python"));
-    maturin.args(["-m", "maturin", "build", "--quiet", "--profile", profile, "--out"]).arg(out);
+    maturin.args(["-m", "maturin", "build", "--quiet", "--profile", "dev", "--out"]).arg(out);
     said(&mut maturin, BUILDS_WITHIN)?;
     let wheels: Vec<PathBuf> =
         out.read_dir()?.map(|entry| Ok(entry?.path())).collect::<Result<_>>()?;
@@ -79,22 +69,25 @@ fn install_wheel(out: &Path, profile: &str) -> Result<PathBuf> {
     let name = wheel.file_name().unwrap_or_default().to_string_lossy();
     let is_named = name.starts_with("frameless-") && name.contains("-cp310-abi3-");
     ensure!(is_named, "wanted a wheel named frameless-…-cp310-abi3-…, got {name}");
+    // Whether the compiled half keeps to what its tag promises.
+    let mut audit = python();
+    said(audit.args(["-m", "abi3audit", "--strict"]).arg(wheel), CHECKS_WITHIN)?;
     let mut pip = python();
     pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
     pip.args(["--force-reinstall", "--no-deps"]).arg(wheel);
     said(&mut pip, CHECKS_WITHIN)?;
-    Ok(wheel.clone())
+    let bytes = wheel.metadata()?.len();
+    Ok(Done::passed(format!("{} MB", bytes / 1_000_000)))
 }
 
 /// The speed of samples of real scenes beside Mitsuba's, what an edit, loading and memory take, with everything optimised. The numbers
 /// are printed.
-pub(crate) fn measure_scenes(out: &Path) -> Result<Done> {
+pub(crate) fn measure_scenes() -> Result<Done> {
     if let Some(missing) = missing::to_make_a_venv() {
         return Ok(Done::skipped(format!("real scenes: {missing}")));
     }
     install(REQUIREMENTS)?;
     run(cargo(&["build", "--release", "--bin", "frameless"]))?;
-    install_wheel(out, "release")?;
     let mut measuring = python();
     measuring.arg("python/against_mitsuba/measure.py").arg("target/release/frameless");
     if let Some(llvm) = missing::llvm() {

@@ -65,7 +65,7 @@ pub(crate) fn measure_web_page() -> bool {
 /// Real scenes, beside Mitsuba. True if they could be measured.
 pub(crate) fn measure_scenes() -> bool {
     let mut steps = Steps::new(in_ci());
-    steps.step("real scenes, measured", || package::measure_scenes(&out_dir("scenes")?));
+    steps.step("real scenes, measured", package::measure_scenes);
     steps.finish()
 }
 

@@ -4,6 +4,7 @@ mod display;
 mod edit;
 mod engine;
 mod sampler;
+mod still;
 mod table;
 
 use crate::args::{BenchArgs, Benchmark};
@@ -17,6 +18,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
         Benchmark::Sampler => sampler::measure(args)?,
         Benchmark::Display => display::measure(args)?,
         Benchmark::Edit => edit::measure(args)?,
+        Benchmark::Still => still::measure(args)?,
     };
     let text = if args.json { table::json(&rows) } else { table::plain(&rows) };
     Ok(output::print(&text)?)

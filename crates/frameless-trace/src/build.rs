@@ -98,7 +98,8 @@ impl Tree {
         corners: &impl Fn(u32, u32) -> [Vec3; 3],
     ) -> usize {
         let Tree { blas: Blas { nodes, packs, .. }, instance: instances } = self;
-        (packs.clear(), instances.clear());
+        packs.clear();
+        instances.clear();
         collapse(binary, nodes, |members| {
             let first = packs.len();
             let mut members: Vec<(u32, u32)> = members.iter().map(|&m| member(m)).collect();
@@ -107,8 +108,9 @@ impl Tree {
                 let instance = same[0].0;
                 let primitives: Vec<u32> = same.iter().map(|member| member.1).collect();
                 let all: Vec<u32> = (0..primitives.len() as u32).collect();
-                packs.push(pack(&primitives, &all, &|primitive| corners(instance, primitive)));
-                instances.push(instance);
+                let there = |primitive| corners(instance, primitive);
+                packs.extend(all.chunks(4).map(|four| pack(&primitives, four, &there)));
+                instances.resize(packs.len(), instance);
             }
             Child::leaf(first, packs.len() - first)
         })

@@ -114,6 +114,9 @@ impl World {
         if moved || !same_world {
             let standing = self.standing.as_ref().filter(|all| all.holds(&moment.placed));
             moment.standing_holds = standing.is_some();
+            if standing.is_none() && self.standing.is_some() {
+                self.part_what_stands();
+            }
             let trees = Trees { rigid: &self.blas, deforming: &moment.deforming };
             moment.top.rebuild(&moment.placed, trees, standing);
         }

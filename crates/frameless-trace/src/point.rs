@@ -34,7 +34,7 @@ pub(crate) struct Point {
     /// What finds the point again, see [`frameless::Surface::position`]: barycentric weights if the object deforms, else
     /// `local_position`.
     pub(crate) anchor: Vec3A,
-    /// Unit shading normal in the object's coordinates.
+    /// Shading normal in the object's coordinates, of any length.
     pub(crate) local_normal: Vec3A,
     /// What the material says here.
     pub(crate) matter: Matter,
@@ -73,7 +73,7 @@ impl Point {
             object: hit.instance,
             primitive: hit.primitive,
             position: self.anchor.to_array(),
-            normal: self.local_normal.to_array(),
+            normal: self.local_normal.try_normalize().unwrap_or(Vec3A::Y).to_array(),
             albedo: albedo.to_array(),
             direct: (albedo * per_albedo).to_array(),
             lit,
@@ -379,7 +379,7 @@ fn into_world(ray: &Ray, placed: &Placed, local: &Local<'_>, matter: Matter) -> 
         is_front: local.is_front,
         local_position: local.position,
         anchor: local.anchor,
-        local_normal: local_normal.try_normalize().unwrap_or(Vec3A::Y),
+        local_normal,
         matter,
         material: local.material,
     }

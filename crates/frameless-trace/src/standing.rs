@@ -283,3 +283,60 @@ impl<K: Kernel, const ANY: bool, S: Stops> Leaves for Packs<'_, K, ANY, S> {
         found
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use frameless::{Request, Size};
+    use frameless_scene::builtin;
+
+    use crate::camera::{Camera, ViewSource};
+    use crate::moment::Moment;
+    use crate::traverse::Stack;
+    use crate::world::World;
+
+    const SIZE: Size = Size { width: 160, height: 120 };
+
+    fn world() -> World {
+        World::new(Arc::new(builtin("shadow").expect("it is built in")))
+    }
+
+    fn hits(world: &World, moment: &Moment) -> Vec<Option<crate::ray::Hit>> {
+        let view = ViewSource::Camera(0).at(world.scene(), moment.state());
+        let (camera, mut stack) = (Camera::new(&view, SIZE), Stack::new());
+        let rays = (0..SIZE.pixels() as u32).map(|pixel| Request::in_sequence(pixel, 1));
+        rays.map(|request| moment.targets(world).closest(&camera.ray(&request), &mut stack))
+            .collect()
+    }
+
+    #[test]
+    fn one_tree_finds_what_two_levels_find() {
+        let world = world();
+        let mut moment = world.moment(0.5);
+        assert!(moment.targets(&world).standing.is_some(), "nothing stands: this tests nothing");
+        let one = hits(&world, &moment);
+        assert!(one.iter().flatten().count() > SIZE.pixels() / 2);
+        let node = world.scene().instances[first_standing(&world)].node as usize;
+        let place = |state: &mut frameless_scene::State| {
+            state.world_from_node[node].translation.y -= 1e3;
+        };
+        world.update_moment_with(0.5, &mut moment, place);
+        assert!(moment.targets(&world).standing.is_none(), "what has moved counts as standing");
+        let gone = first_standing(&world) as u32;
+        let two = hits(&world, &moment);
+        let mut compared = 0;
+        for (one, two) in
+            one.iter().zip(&two).filter(|(one, _)| one.is_none_or(|hit| hit.instance != gone))
+        {
+            assert_eq!(one, two);
+            compared += 1;
+        }
+        assert!(compared > 100, "{compared}");
+    }
+
+    fn first_standing(world: &World) -> usize {
+        let standing = world.standing.as_ref().expect("something stands");
+        (0..world.scene().instances.len()).rfind(|&k| standing.has(k)).expect("one of them")
+    }
+}

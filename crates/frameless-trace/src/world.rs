@@ -54,14 +54,18 @@ impl World {
     pub(crate) fn with_isa(scene: Arc<Scene>, isa: Isa) -> World {
         static WORLDS: AtomicU64 = AtomicU64::new(1);
         let is_rigid = rigid_geometries(&scene);
-        let standing = Standing::new(&scene);
-        let blas =
-            (scene.geometries.par_iter().zip(is_rigid)).map(
-                |(geometry, is_rigid)| match geometry {
-                    Geometry::Mesh(mesh) if is_rigid => Blas::new(mesh).into(),
-                    _ => Blas::new(&Mesh::default()).into(),
-                },
-            );
+        let (standing, copies) = rayon::join(|| Standing::new(&scene), || Copies::new(&scene));
+        let mut stands = vec![false; scene.geometries.len()];
+        for (index, instance) in scene.instances.iter().enumerate() {
+            let is_there = standing.as_ref().is_some_and(|standing| standing.has(index));
+            stands[instance.geometry as usize] |= is_there;
+        }
+        let geometries = scene.geometries.par_iter().zip(is_rigid).zip(stands);
+        let blas = geometries.map(|((geometry, is_rigid), stands)| match geometry {
+            Geometry::Mesh(_) if stands => OnceLock::new(),
+            Geometry::Mesh(mesh) if is_rigid => Blas::new(mesh).into(),
+            _ => Blas::new(&Mesh::default()).into(),
+        });
         let holes: Vec<bool> = scene.geometries.iter().map(|g| has_holes(&scene, g)).collect();
         World {
             has_holes: holes.contains(&true),
@@ -72,7 +76,7 @@ impl World {
             mirrors: Mirrors::new(&scene),
             emitters: Emitters::new(&scene),
             surroundings: scene.environment.as_ref().map(Surroundings::new),
-            copies: Copies::new(&scene),
+            copies,
             is_plain: scene.materials.iter().map(|m| is_plain(&scene, m)).collect(),
             scene,
             isa,
@@ -99,6 +103,17 @@ impl World {
         match &self.surroundings {
             None => ambient,
             Some(surroundings) => ambient + surroundings.irradiance(normal) * FRAC_1_PI,
+        }
+    }
+
+    /// Makes the trees of what stands still, for a moment at which it does not.
+    #[cold]
+    pub(crate) fn part_what_stands(&self) {
+        for (blas, geometry) in self.blas.iter().zip(&self.scene.geometries) {
+            blas.get_or_init(|| match geometry {
+                Geometry::Mesh(mesh) => Blas::new(mesh),
+                Geometry::Sphere { .. } => Blas::new(&Mesh::default()),
+            });
         }
     }
 

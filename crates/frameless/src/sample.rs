@@ -63,8 +63,9 @@ impl Request {
     /// unreasonable effectiveness of quasirandom sequences"), whose number 0 is the centre.
     pub fn in_sequence(pixel: u32, sample_index: u32) -> Request {
         const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
-        let offset =
-            STEPS.map(|step| ((0.5 + f64::from(sample_index) * step).fract() - 0.5) as f32);
+        // Below 2³², so that a whole number holds what is before the point: faster than a call of `fract`.
+        let fract = |x: f64| x - (x as i64) as f64;
+        let offset = STEPS.map(|step| (fract(0.5 + f64::from(sample_index) * step) - 0.5) as f32);
         // Rounding must not reach the next pixel.
         Request { pixel, offset: offset.map(|o| o.min(0.499_999)), sample_index }
     }

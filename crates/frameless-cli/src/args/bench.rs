@@ -4,8 +4,8 @@ use clap::{Args as ClapArgs, ValueEnum};
 use frameless::Size;
 use frameless_scene::AnimationChoice;
 
-use super::ChoiceArgs;
 use super::view::DEFAULT_SCENE;
+use super::{ChoiceArgs, LightArgs};
 use crate::failure::Failure;
 use crate::parse;
 
@@ -35,6 +35,15 @@ pub(crate) struct BenchArgs {
     /// Of `edit`: the name of the object that jumps [default: the scene's first]
     #[arg(long, value_name = "NAME")]
     object: Option<String>,
+
+    /// Of `still`: how light is followed
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
+
+    /// Of `still`: samples per pixel
+    #[arg(long, value_name = "N", default_value_t = 8)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    pub(crate) samples: u32,
 
     /// Size of the picture in pixels
     #[arg(long, value_name = "WxH", default_value = "512x384", value_parser = parse::size)]
@@ -98,4 +107,6 @@ pub(crate) enum Benchmark {
     Display,
     /// An object jumps by 10 cm: seconds until what it changes is right again, with paths
     Edit,
+    /// Whole pictures: samples per second without a loop
+    Still,
 }

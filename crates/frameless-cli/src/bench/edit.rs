@@ -16,7 +16,8 @@ use crate::failure::Failure;
 use crate::input;
 
 const CAMERA: ViewSource = ViewSource::Camera(0);
-const PATH: Settings = Settings { integrator: Integrator::Path, max_depth: 4, lens: None, surfaces: true };
+const PATH: Settings =
+    Settings { integrator: Integrator::Path, max_depth: 4, lens: None, surfaces: true };
 /// In the world.
 const JUMP_M: Vec3 = Vec3::new(0.1, 0.0, 0.0);
 /// When it comes; by then the picture has settled.
@@ -25,7 +26,7 @@ const JUMP_SECS: f64 = 6.0;
 const WATCHED_SECS: f64 = 4.0;
 const REFRESHES_PER_SEC: f64 = 30.0;
 /// Of the converged pictures before and after, which are made by the same random numbers: what differs is the object.
-const IDEAL_SAMPLES: u32 = 512;
+const IDEAL_SAMPLES: u32 = 256;
 /// In display-referred sRGB: what one sees.
 const CHANGED: f32 = 0.04;
 const RIGHT: f32 = 0.05;

@@ -49,7 +49,8 @@ impl Kernel for Avx2 {
         // SAFETY: see the module.
         unsafe {
             let plane = |axis: usize, far: usize| {
-                let row = &node.bounds[2 * axis + (ray.entry[axis] ^ far)];
+                // Masked, so that the compiler knows that the row is there.
+                let row = &node.bounds[2 * axis + ((ray.entry[axis] ^ far) & 1)];
                 let from_origin =
                     _mm256_sub_ps(_mm256_load_ps(row.as_ptr()), _mm256_set1_ps(ray.origin[axis]));
                 _mm256_mul_ps(from_origin, _mm256_set1_ps(ray.reciprocal[axis]))
