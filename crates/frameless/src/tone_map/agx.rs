@@ -31,7 +31,7 @@ const MIDDLE_GREY: f64 = 0.18;
 const DISPLAY_GAMMA: f64 = 2.4;
 
 /// f of any number ≥ 0: a table, linear between its knots. These are the numbers whose bits end in zeros, 64 to the octave: evenly
-/// spaced within each, as good as evenly in the logarithm, and found without one. Within 5e-5 of f.
+/// spaced within each, as good as evenly in the logarithm, and found without one. Within 2e-4 of f, a twentieth of an 8-bit step.
 fn transfer(v: f32) -> f32 {
     let bits = v.clamp(TABLE_FROM, TABLE_TO).to_bits() - TABLE_FROM.to_bits();
     let (knot, rest) = (bits >> KNOT_BITS, bits & ((1 << KNOT_BITS) - 1));
@@ -100,7 +100,7 @@ mod tests {
         for step in 0..=20_000 {
             let v = (f64::from(step) / 1000.0 - 14.0).exp2();
             let (got, want) = (f64::from(transfer(v as f32)), exact(v));
-            assert!((got - want).abs() < 5e-5, "f({v}) = {want}, table {got}");
+            assert!((got - want).abs() < 2e-4, "f({v}) = {want}, table {got}");
         }
         assert_eq!(transfer(0.0), 0.0);
     }
