@@ -121,7 +121,8 @@ fn clippy() -> Result<Done> {
 /// otherwise, and with it the word that it skipped something; what passed is shown in numbers only, and kept in a file. This program's own tests pretend to skip, and are
 /// run by themselves.
 fn cargo_test() -> Result<Done> {
-    let product = ["test", "--workspace", "--exclude", "xtask", "--", "--show-output"];
+    let product =
+        ["test", "--workspace", "--exclude", "xtask", "--no-fail-fast", "--", "--show-output"];
     let (output, success) = watch(cargo(&product), || {
         let mut is_of_success = false;
         move |line: &str| {
@@ -130,7 +131,7 @@ fn cargo_test() -> Result<Done> {
             !(is_of_success || line.ends_with("... ok\n") || is_progress(line))
         }
     })?;
-    std::fs::write(dir_of("tests.log")?, &output).context("cannot keep the tests' output")?;
+    std::fs::write(out_dir("tests")?.join("log"), &output).context("cannot keep their output")?;
     let count = Count::of(&output);
     ensure!(success, "`cargo test` failed ({count})");
     ensure!(count.passed > 0, "`cargo test` ran no tests");
