@@ -10,13 +10,13 @@ use agx::agx;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ToneMap {
     /// Khronos PBR Neutral: base colours as they are up to 0.76, highlights compressed and desaturated.
-    #[default]
     Neutral,
     /// AgX by Sobotka, as Blender has it: bright colours turn pale before they turn white, as on film.
     Agx,
     /// The ACES reference rendering and sRGB output transforms, as fitted by Hill: the contrast of film.
     Aces,
     /// What is brighter than white is white, channel by channel: colours as they are, and hard edges around what is too bright.
+    #[default]
     None,
 }
 
