@@ -268,7 +268,7 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let integrator = integrator_named(integrator)?;
         let max_depth = whole("max_depth", max_depth, 0..=1000)?;
-        let settings = Settings { integrator, max_depth, surfaces: false };
+        let settings = Settings { integrator, max_depth, lens: None, surfaces: false };
         let samples = whole("samples", samples, 1..=1 << 20)?;
         let first_sample = whole("first_sample", first_sample, 0..=u32::MAX)?;
         let (secs, view) = (Scene::checked_secs(time)?, self.view(camera)?);
