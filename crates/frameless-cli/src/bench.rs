@@ -3,6 +3,7 @@
 mod display;
 mod edit;
 mod engine;
+mod rays;
 mod sampler;
 mod still;
 mod table;
@@ -18,6 +19,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
         Benchmark::Sampler => sampler::measure(args)?,
         Benchmark::Display => display::measure(args)?,
         Benchmark::Edit => edit::measure(args)?,
+        Benchmark::Rays => rays::measure(args)?,
         Benchmark::Still => still::measure(args)?,
     };
     let text = if args.json { table::json(&rows) } else { table::plain(&rows) };

@@ -35,13 +35,13 @@ impl Ray {
 
 /// The nearest intersection of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Hit {
+pub struct Hit {
     /// Along the ray, in multiples of its direction.
-    pub(crate) t: f32,
+    pub t: f32,
     /// Barycentric weights of the triangle's second and third vertex; 0 on spheres.
-    pub(crate) barycentric: [f32; 2],
+    pub barycentric: [f32; 2],
     /// Triangle; 0 on spheres.
-    pub(crate) primitive: u32,
+    pub primitive: u32,
     /// Index into the scene's instances.
-    pub(crate) instance: u32,
+    pub instance: u32,
 }

@@ -1,5 +1,7 @@
 //! What `frameless bench` takes.
 
+use std::path::PathBuf;
+
 use clap::{Args as ClapArgs, ValueEnum};
 use frameless::Size;
 use frameless_scene::AnimationChoice;
@@ -18,13 +20,14 @@ use crate::parse;
   frameless bench engine
   frameless bench engine --scene model.glb --threads 1
   frameless bench edit --scene model.glb --object Chair --rounds 3
-  frameless bench sampler --json")]
+  frameless bench sampler --json
+  frameless bench rays --scene generated --rounds 5")]
 pub(crate) struct BenchArgs {
     /// What to measure
     #[arg(value_enum)]
     pub(crate) what: Benchmark,
 
-    /// A glTF file or a built-in scene [default: sphere; `display` has scenes of its own]
+    /// A glTF file or a built-in scene [default: sphere; `display` and `rays` have scenes of their own]
     #[arg(long)]
     scene: Option<String>,
 
@@ -61,6 +64,14 @@ pub(crate) struct BenchArgs {
     #[arg(long, default_value_t = 0.5, value_parser = parse::positive)]
     pub(crate) secs: f64,
 
+    /// Of `rays`: Embree 4's library [default: that of Python's embreex, or the system's]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) embree: Option<PathBuf>,
+
+    /// Of `rays`: how many triangles its own scenes have, of those that they have by default
+    #[arg(long, value_name = "PART", default_value_t = 1.0, hide = true, value_parser = parse::positive)]
+    detail: f64,
+
     /// Print one JSON object, {"rows": [{name, value, min, max, unit, conditions}]}
     #[arg(long)]
     pub(crate) json: bool,
@@ -70,6 +81,16 @@ impl BenchArgs {
     /// What is traced.
     pub(crate) fn scene(&self) -> &str {
         self.scene.as_deref().unwrap_or(DEFAULT_SCENE)
+    }
+
+    /// What is traced, if it was named.
+    pub(crate) fn named_scene(&self) -> Option<&str> {
+        self.scene.as_deref()
+    }
+
+    /// Of the triangles of scenes made by code.
+    pub(crate) fn detail(&self) -> f32 {
+        self.detail as f32
     }
 
     /// What jumps, if it was named.
@@ -109,4 +130,6 @@ pub(crate) enum Benchmark {
     Edit,
     /// Whole pictures: samples per second without a loop
     Still,
+    /// Bare rays: how many per second on one thread, beside Embree 4 where it is found
+    Rays,
 }

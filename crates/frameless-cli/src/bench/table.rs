@@ -43,11 +43,11 @@ pub(super) fn json(rows: &[Row]) -> String {
 }
 
 pub(super) fn plain(rows: &[Row]) -> String {
-    let mut text = format!("{:48} {:>12} {:>12} {:>12}  unit\n", "name", "median", "min", "max");
+    let mut text = format!("{:56} {:>10} {:>10} {:>10}  unit\n", "name", "median", "min", "max");
     for row in rows {
         // Writing to a string cannot fail.
         let [value, min, max] = [row.value, row.min, row.max].map(four_digits);
-        let _ = writeln!(text, "{:48} {value:>12} {min:>12} {max:>12}  {}", row.name, row.unit);
+        let _ = writeln!(text, "{:56} {value:>10} {min:>10} {max:>10}  {}", row.name, row.unit);
     }
     let mut conditions: Vec<&str> = rows.iter().map(|row| row.conditions.as_str()).collect();
     conditions.dedup();

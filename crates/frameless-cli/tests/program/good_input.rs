@@ -127,3 +127,29 @@ fn scenes_and_animations_of_a_file_are_listed_and_chosen() {
     let still = frameless(&["info", "sphere", "--animation", "none"]).succeeded().out;
     assert!(still.contains("motion      none"), "{still}");
 }
+
+#[test]
+fn bench_rays_names_what_others_rely_on() {
+    let settings = ["--rounds", "1", "--size", "32x24", "--detail", "0.001"];
+    let arguments = [&["bench", "rays", "--json"][..], &settings].concat();
+    let run = frameless(&arguments);
+    assert_eq!(run.code, Some(0), "{}", run.err);
+    let report: serde_json::Value = serde_json::from_str(&run.out).expect("one JSON object");
+    let rows = report["rows"].as_array().expect("rows");
+    let value = |name: &str| {
+        let row = rows.iter().find(|row| row["name"] == name);
+        row.unwrap_or_else(|| panic!("no {name} in {}", run.out))["value"]
+            .as_f64()
+            .expect("a number")
+    };
+    // Without Embree, which says so; with it there are ratios, too.
+    let has_embree = !run.err.contains("Embree 4 was not found");
+    let sets = ["primary-scan", "primary-random", "primary-clustered", "primary-sorted", "shadow"];
+    let others = ["reflection", "diffuse", "instances-1", "instances-100", "instances-10000"];
+    for set in sets.iter().chain(&others) {
+        assert!(value(&format!("rays.generated.{set}.mrays_per_sec")) > 0.0, "{set}");
+        if has_embree {
+            assert!(value(&format!("rays.generated.{set}.ratio_to_embree")) > 0.0, "{set}");
+        }
+    }
+}
