@@ -2,14 +2,11 @@
 
 use super::fingerprint::fingerprint;
 use super::store::Key;
+use super::versions::{WORLD_VERSION, versioned};
 use crate::error::EvalError;
 use crate::experiment::{Experiment, SceneSpec};
 use crate::results::RESULTS_VERSION;
 use crate::run::Cell;
-
-/// Increased whenever a tracer, an algorithm, a metric or the way pictures are made gives other results for the same input:
-/// cells of other versions are not used again.
-const CODE_VERSION: u32 = 7;
 
 /// The runs of a scene: rates, algorithms, seeds, in this order. What is not random runs with the first seed only.
 pub(super) fn cells_of(experiment: &Experiment, spec: &SceneSpec) -> Vec<Cell> {
@@ -51,7 +48,7 @@ impl SceneKey {
         let SceneSpec { source, camera, events, .. } = spec;
         let Experiment { size, display_hz, refreshes, unscored, metrics, .. } = experiment;
         let text = format!(
-            "frameless cell, results version {RESULTS_VERSION}, code version {CODE_VERSION}\n\
+            "frameless cell, results version {RESULTS_VERSION}, world version {WORLD_VERSION}\n\
              scene {}\n\
              camera {camera:?}\n\
              events {events:?}\n\
@@ -73,7 +70,7 @@ impl SceneKey {
         Key::new(format!(
             "{}run {}, {samples_per_sec} samples/s, seed {seed}, {measured}\n",
             self.text,
-            algorithm.name()
+            versioned(algorithm)
         ))
     }
 

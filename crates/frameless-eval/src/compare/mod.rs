@@ -12,6 +12,7 @@ mod progress;
 mod publish;
 mod scene_work;
 mod store;
+mod versions;
 
 pub use progress::Progress;
 

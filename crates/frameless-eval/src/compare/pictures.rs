@@ -12,6 +12,7 @@ use super::cells::SceneKey;
 use super::cost;
 use super::progress::Work;
 use super::store::Key;
+use super::versions::versioned;
 use crate::algorithm::Algorithm;
 use crate::contender::{Arena, Shown};
 use crate::error::EvalError;
@@ -38,12 +39,12 @@ pub(crate) fn pictured_refreshes(experiment: &Experiment) -> Vec<usize> {
 
 /// Everything that the pictures depend on.
 pub(super) fn key(experiment: &Experiment, scene: &SceneKey) -> Key {
-    let names: Vec<String> = experiment.algorithms.iter().map(Algorithm::name).collect();
+    let names: Vec<String> = experiment.algorithms.iter().map(versioned).collect();
     scene.pictures(&format!(
         "at {} samples/s, seed {}, of {} at {:?}; {} stills and {} of {}",
         pictured_rate(experiment),
         experiment.seeds[0],
-        names.join(" "),
+        names.join(", "),
         pictured_refreshes(experiment),
         experiment.stills.len(),
         if experiment.video { "a video" } else { "no video" },
