@@ -59,7 +59,7 @@ fn a_picture_at_rest_is_the_held_one_bit_for_bit_also_after_motion() {
 fn no_pixel_grows_older_than_its_share_of_the_even_part_allows() {
     // Of every batch holes take at most 40 %, fronts 60 % and late looks 40 % of the rest, and the even part is a fifth of what is left.
     let of_plain = 0.6 * 0.4 * 0.6 * 0.2;
-    for rate in [83_000.0, 400_000.0] {
+    for rate in [83_000.0, 360_000.0, 400_000.0] {
         KINDS.into_iter().for_each(|kind| check_oldest(kind, rate, of_plain));
     }
     // While something is refined, 3 %.

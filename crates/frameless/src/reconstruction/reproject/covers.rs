@@ -18,9 +18,10 @@
 
 use std::ops::Range;
 
+use super::holes::{Hole, Waiting};
 use super::store::{EMPTY, SCREEN, Sample, Store, Tick};
-use crate::Size;
 use crate::wide::{self, F8, M8, Unit};
+use crate::{Size, bayer};
 
 /// Side of a tile in which covering samples are counted, in pixels.
 const TILE: u32 = 16;
@@ -39,6 +40,11 @@ const BEHIND: f32 = 1.0 / 0.9;
 const LEAST_COVERING: u32 = 3;
 /// Of the new samples in a tile, one in so many at least.
 const LEAST_SHARE: u32 = 4;
+
+/// Of each block of so many pixels a side a few are traced if something may have come before it.
+const PROBED: u32 = 8;
+/// So many.
+const PROBES: usize = 4;
 
 /// A block without new samples.
 const NOTHING: f32 = f32::NEG_INFINITY;
@@ -64,12 +70,16 @@ pub(super) struct Covers {
     tiles: Vec<Tile>,
     /// Tiles to look at, by their first pixels, and since when.
     suspect: Vec<([u32; 2], Tick)>,
+    /// Places in a block of [`PROBED`] pixels a side, in the order in which they are traced.
+    probes: Vec<(u32, u32)>,
 }
 
 impl Covers {
     /// Forgets everything.
     pub(super) fn fit(&mut self, size: Size) {
         self.columns = size.width.div_ceil(TILE);
+        self.probes = bayer::order(PROBED.trailing_zeros());
+        self.suspect.clear();
         self.tiles.clear();
         self.tiles.resize((self.columns * size.height.div_ceil(TILE)) as usize, Tile::default());
     }
@@ -93,8 +103,32 @@ impl Covers {
         }
     }
 
+    /// Everything may be covered, by what is traced from now on.
+    pub(super) fn doubt_all(&mut self, now: Tick) {
+        self.tiles.fill(Tile { begun: now, covering: 1, others: 0 });
+        self.find_suspect();
+    }
+
+    /// In suspect tiles a few pixels that have not been traced since are to be, so that there is something to judge the others by.
+    pub(super) fn probe(&self, store: &Store, waiting: &mut Waiting) {
+        let size = store.layout.size;
+        for &([x0, y0], begun) in &self.suspect {
+            let blocks = (0..TILE).step_by(PROBED as usize);
+            for (dy, dx) in blocks.clone().flat_map(|dy| blocks.clone().map(move |dx| (dy, dx))) {
+                for &(x, y) in &self.probes[..PROBES] {
+                    let (x, y) = (x0 + dx + x, y0 + dy + y);
+                    let is_old = |cell: usize| begun.is_later_than(Tick(store.tick[cell]));
+                    if x < size.width && y < size.height && store.newest(x, y).is_some_and(is_old) {
+                        waiting.push(size.index(x, y), x, y, Hole::Large);
+                    }
+                }
+            }
+        }
+    }
+
     /// At a refresh, once all samples are where they are now. Empties cells.
     pub(super) fn run(&mut self, store: &mut Store) {
+        self.suspect.clear();
         let mut any = false;
         for tile in &mut self.tiles {
             if tile.covering * LEAST_SHARE < tile.covering + tile.others {
@@ -320,5 +354,44 @@ mod tests {
     #[test]
     fn what_turns_out_to_be_farther_takes_nothing_away() {
         assert_eq!(left_after(|_, _| false).len(), SIZE.pixels());
+    }
+
+    #[test]
+    fn after_a_cut_a_few_pixels_of_every_block_are_probed() {
+        let (mut store, mut covers) = (Store::new(SIZE, 1), Covers::default());
+        covers.fit(SIZE);
+        let pixels = || (0..SIZE.height).flat_map(|y| (0..SIZE.width).map(move |x| (x, y)));
+        for (x, y) in pixels() {
+            store.insert(&sample(x as f32, y as f32, 10.0, 1), false);
+        }
+        let probed = |covers: &Covers, store: &Store| {
+            let (mut waiting, mut ordered) = (Waiting::default(), Vec::new());
+            covers.probe(store, &mut waiting);
+            waiting.order(&mut ordered);
+            ordered
+        };
+        assert_eq!(probed(&covers, &store), [], "nothing is suspect");
+        covers.doubt_all(Tick(2));
+        let first = probed(&covers, &store);
+        let blocks = SIZE.pixels() / (PROBED * PROBED) as usize;
+        assert_eq!(first.len(), PROBES * blocks);
+        let block = |&pixel: &u32| (SIZE.xy(pixel).0 / PROBED, SIZE.xy(pixel).1 / PROBED);
+        let mut reached: Vec<(u32, u32)> = first[..blocks].iter().map(block).collect();
+        reached.sort_unstable();
+        reached.dedup();
+        assert_eq!(reached.len(), blocks, "one in each block before there are two in any");
+        // Something nearer is found at the first of them: everything older is covered by it.
+        for &pixel in &first[..blocks] {
+            let (x, y) = SIZE.xy(pixel);
+            let new = sample(x as f32, y as f32, 1.0, 3);
+            covers.note(&store, store.layout.of_px(new.px).expect("inside"), &new);
+            store.insert(&new, false);
+        }
+        covers.run(&mut store);
+        let is_far =
+            |&(x, y): &(u32, u32)| store.newest(x, y).is_some_and(|cell| store.depth[cell] > 5.0);
+        assert_eq!(pixels().filter(is_far).count(), 0);
+        covers.run(&mut store);
+        assert!(probed(&covers, &store).iter().all(|pixel| !first[..blocks].contains(pixel)));
     }
 }

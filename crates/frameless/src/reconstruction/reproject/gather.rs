@@ -13,6 +13,7 @@ use std::ops::Range;
 
 use super::fill::{self, AROUND};
 use super::holes::{Hole, Waiting};
+use super::smooth::Smooth;
 use super::store::{EMPTY, Layout, Store, TICK_SECS, Tick, centres, distance2};
 use crate::bands;
 use crate::rates::Rates;
@@ -33,6 +34,7 @@ pub(super) struct Gather {
     source: Vec<u32>,
     /// Holes that are not beside samples.
     far: Vec<u32>,
+    smooth: Smooth,
     /// Of each band of rows.
     found: Vec<Found>,
 }
@@ -56,6 +58,7 @@ impl Gather {
             waiting: Waiting::default(),
             source: Vec::new(),
             far: Vec::new(),
+            smooth: Smooth::default(),
             found: Vec::new(),
         }
     }
@@ -114,14 +117,16 @@ impl Gather {
     }
 
     fn fill_far(&mut self, size: Size, shown: &[[f32; 3]], picture: &mut [[f32; 3]]) {
+        if self.far.len() == size.pixels() {
+            picture.copy_from_slice(shown);
+        } else {
+            self.smooth.run(size, &self.far, &self.source, mean_of(shown), picture);
+        }
         fill::nearest(size, &self.far, &mut self.source);
         for &pixel in &self.far {
-            let i = pixel as usize;
-            let source = self.source[i] as usize;
-            (picture[i], self.time[i]) = match self.source[i] {
-                fill::NOBODY => (shown[i], Time::ZERO),
-                _ => (picture[source], self.time[source]),
-            };
+            let source = self.source[pixel as usize];
+            let time = if source == fill::NOBODY { Time::ZERO } else { self.time[source as usize] };
+            self.time[pixel as usize] = time;
         }
     }
 
@@ -144,6 +149,13 @@ impl Gather {
         bands::run(threads, bands.collect(), wide::run);
         self.found.iter_mut().for_each(|found| self.waiting.append(&mut found.waiting));
     }
+}
+
+/// Of every so manieth pixel: in what is shown far from everything that is known, details do not count.
+fn mean_of(shown: &[[f32; 3]]) -> [f32; 3] {
+    let few = shown.iter().step_by(31);
+    let count = few.len() as f32;
+    few.fold([0.0; 3], |sum, c| std::array::from_fn(|k| sum[k] + c[k])).map(|sum| sum / count)
 }
 
 struct OffCentre<'a, F> {

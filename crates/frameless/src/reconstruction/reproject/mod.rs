@@ -9,6 +9,7 @@ mod aim;
 mod cells;
 mod covers;
 mod cracks;
+mod drift;
 mod fill;
 mod gather;
 mod holes;
@@ -17,6 +18,8 @@ mod relight;
 mod residual;
 mod rest;
 mod settle;
+mod shadows;
+mod smooth;
 mod stage;
 mod store;
 mod warp;
@@ -43,6 +46,8 @@ pub struct Reproject {
     relight: relight::Relight,
     settled: settle::Settled,
     covers: covers::Covers,
+    shadows: shadows::Shadows,
+    drift: drift::Drift,
     /// The picture of the last refresh, and what is needed to find a surface in it.
     shown: Vec<[f32; 3]>,
     shown_at: Time,
@@ -54,6 +59,10 @@ pub struct Reproject {
     /// When everything was carried somewhere else last, since the camera moved.
     carried: Tick,
     refreshes: u64,
+    /// Whether the lights of the last refresh are known.
+    knows_lights: bool,
+    /// How many pixels had no sample at the last refresh.
+    unknown: usize,
     contrast: Vec<f32>,
     holes: Vec<u32>,
     edges: Vec<u32>,
@@ -74,6 +83,8 @@ impl Reproject {
             relight: Default::default(),
             settled: Default::default(),
             covers: Default::default(),
+            shadows: Default::default(),
+            drift: Default::default(),
             shown: Vec::new(),
             shown_at: Time::ZERO,
             display: Display::default(),
@@ -81,6 +92,8 @@ impl Reproject {
             interval_secs: 0.0,
             carried: Tick::default(),
             refreshes: 0,
+            knows_lights: false,
+            unknown: 0,
             contrast: Vec::new(),
             holes: Vec::new(),
             edges: Vec::new(),
@@ -96,10 +109,13 @@ impl Reproject {
         self.store = Store::new(size, self.cells);
         self.warp = Default::default();
         self.refreshes = 0;
+        self.unknown = 0;
         self.carried = Tick::default();
         self.shown.clear();
         self.settled.fit(size);
         self.covers.fit(size);
+        self.shadows.fit(size);
+        self.drift.fit(size);
         self.no_rates = None;
     }
 
@@ -132,8 +148,11 @@ impl Reproject {
         let Some(cell) = self.store.layout.of_px(sample.px) else { return };
         if self.refreshes >= 2 {
             self.covers.note(&self.store, cell, sample);
-            if !self.settled.rests(self.store.object[cell]) {
+            let object = self.store.object[cell];
+            if !self.settled.rests(object) {
                 self.warp.displace(&mut self.store, cell);
+            } else if object == sample.object {
+                self.shadows.note(&self.store, cell, sample);
             }
         }
     }
@@ -165,6 +184,9 @@ const SHADE_AHEAD: usize = 8;
 
 /// A suspect pixel whose centre was traced later than this before is not looked at again: it shows something finer than a pixel.
 const LONG_SINCE_SECS: f64 = 0.05;
+
+/// Where one pixel in so many has lost its sample from one refresh to the next, the picture is another one.
+const MUCH_GONE: usize = 4;
 
 impl Reconstruction for Reproject {
     fn keep(&mut self, kept: &Kept<'_>, display: &Display, findings: &mut Findings) {
@@ -256,6 +278,12 @@ impl Reproject {
             store.encode_again(&display, |store, cell| relight.linear(store, cell));
             self.settled.encode_again(&display);
         }
+        self.knows_lights = refresh.lighting.is_some();
+        if !self.knows_lights && !refresh.is_noisy && self.refreshes >= 2 {
+            let (now, interval_secs) = (refresh.now, self.interval_secs);
+            self.drift
+                .run(&mut self.store, now, interval_secs, |object| self.settled.rests(object));
+        }
         if let Some(lighting) = refresh.lighting {
             self.relight.run(&mut self.store, lighting, &display, refresh.threads);
         }
@@ -274,6 +302,7 @@ impl Reproject {
         let (now, threads) = (refresh.now, refresh.threads);
         let (store, contrast) = (&self.store, &self.contrast);
         self.gather.run(store, now, threads, rates, contrast, &self.shown, picture);
+        self.doubt(size, now);
         let recentres = self.options.without != Some(ReprojectStage::Recentre);
         if recentres && self.settled.any_rests() {
             let rests = |object| self.settled.rests(object);
@@ -283,6 +312,19 @@ impl Reproject {
             self.settled.show(&mut self.store, &self.relight, refresh, picture);
         }
         self.shown.clone_from(picture);
+    }
+
+    /// Where what was known has gone at once (a cut, a jump), what is left is looked at again, too; so are places before which something
+    /// seems to have come.
+    fn doubt(&mut self, size: Size, now: Time) {
+        if self.options.without == Some(ReprojectStage::Covers) {
+            return;
+        }
+        let before = std::mem::replace(&mut self.unknown, self.gather.waiting.len());
+        if self.refreshes >= 2 && self.unknown.saturating_sub(before) > size.pixels() / MUCH_GONE {
+            self.covers.doubt_all(Tick::of(now));
+        }
+        self.covers.probe(&self.store, &mut self.gather.waiting);
     }
 
     /// Of how many samples pixels at rest are to show the mean; 0: none.
@@ -296,7 +338,7 @@ impl Reproject {
 
     /// Tells the canvas what its pixels show now.
     fn tell(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas) {
-        self.relight.find_shadow_edges(&self.store, &mut self.edges);
+        self.shadows.find_edges(&self.store, self.relight.moved(), &mut self.edges);
         canvas.set_last_minute(&mut self.edges);
         let gather::Gather { waiting, time, known, .. } = &mut self.gather;
         waiting.order(&mut self.holes);

@@ -84,29 +84,9 @@ impl Relight {
         }
     }
 
-    /// Pixels at the edges of shadows whose lights have moved: there the shadow will be somewhere else soon.
-    pub(super) fn find_shadow_edges(&self, store: &Store, edges: &mut Vec<u32>) {
-        edges.clear();
-        if self.moved == 0 {
-            return;
-        }
-        let layout = store.layout;
-        let size = layout.size;
-        let differ = |a: usize, b: usize| {
-            store.object[a] == store.object[b]
-                && (store.shade(a).lit ^ store.shade(b).lit) & self.moved != 0
-        };
-        for y in 0..size.height {
-            for x in 0..size.width {
-                let is_edge = store.of_pixel(x, y).any(|cell| {
-                    let around = [cell - 1, cell + 1, cell - layout.stride, cell + layout.stride];
-                    store.object[cell] < EMPTY && around.iter().any(|&other| differ(cell, other))
-                });
-                if is_edge {
-                    edges.push(size.index(x, y));
-                }
-            }
-        }
+    /// Bit i: light i stood elsewhere at the refresh before.
+    pub(super) fn moved(&self) -> u32 {
+        self.moved
     }
 
     fn shade(&self, store: &mut Store, display: &Display, threads: usize) {

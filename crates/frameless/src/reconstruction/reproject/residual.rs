@@ -4,7 +4,7 @@
 //! nearest pixel and against the bilinear interpolation. For a moving one it is the distance to the range of the 3×3 colours
 //! there, plus a tenth of that: resampling a texture at other places is not change.
 
-use super::store::{SCREEN, Sample};
+use super::store::{SCREEN, Sample, Tick};
 use super::{Reproject, ReprojectStage};
 use crate::{Display, Kept, Request, Size};
 
@@ -55,6 +55,10 @@ impl Reproject {
             // every new one, be thought to change, and so remain a mean.)
             let before = std::array::from_fn(|k| self.store.rgb[k][cell]);
             let change = squared(rgb, before);
+            if !self.knows_lights && !kept.is_noisy {
+                let age_secs = kept.now.secs_since(Tick(self.store.tick[cell]).time(kept.now));
+                self.drift.note([x, y], before, rgb, age_secs as f32);
+            }
             if self.settled.count(request.pixel) > 0 {
                 let (rgb, is_noisy) = (kept.new[i], kept.is_noisy);
                 let reaches_on = self.settled.verify(request.pixel, rgb, change, display, is_noisy);

@@ -70,6 +70,9 @@ pub(super) struct Tick(pub(super) u32);
 const TICK_BITS: u32 = 14;
 pub(super) const TICK_SECS: f32 = (1u64 << TICK_BITS) as f32 * 1e-9;
 
+/// Half a second.
+const VERY_OLD_TICKS: u32 = 500_000_000 >> TICK_BITS;
+
 impl Tick {
     pub(super) fn of(time: Time) -> Tick {
         Tick((time.0 >> TICK_BITS) as u32)
@@ -352,13 +355,18 @@ impl Store {
         })
     }
 
-    /// Puts a sample into its cell. `outdated`: the pixel's others show something that is no longer there.
+    /// Puts a sample into its cell. `outdated`: the pixel's others show something that is no longer there. Very old ones go in any case:
+    /// carried from pixel to pixel, never alone where a new one lands in its cell, they could stay for seconds.
     pub(super) fn insert(&mut self, sample: &Sample, outdated: bool) {
         let Some(i) = self.layout.of_px(sample.px) else { return };
         let subs = self.layout.subs();
-        if outdated && subs > 1 {
+        if subs > 1 {
             let first = i % self.layout.plane;
-            (0..subs).for_each(|sub| self.object[first + sub * self.layout.plane] = EMPTY);
+            for cell in (0..subs).map(|sub| first + sub * self.layout.plane) {
+                if outdated || sample.tick.0.wrapping_sub(self.tick[cell]) > VERY_OLD_TICKS {
+                    self.object[cell] = EMPTY;
+                }
+            }
         }
         self.set(i, sample);
     }

@@ -5,7 +5,7 @@
 //! 1. **Holes** ([`Canvas::holes`]), pixels of which nothing is known: at most 40 %, or the part of the picture that they are.
 //! 2. **Fronts** ([`front`]), at most 60 % of the rest: neighbours of samples that found a change. Gated off where most of
 //!    the picture changes, since there is nothing to follow then.
-//! 3. **Late looks** ([`late`]), in the last batches before a refresh: at most 40 % of the rest.
+//! 3. **Late looks** ([`late`]), in the last batches before a refresh: at most 40 % of the rest, gated as fronts are.
 //! 4. **Refinement** ([`refine`]): more samples for what is at rest, as the control has it.
 //! 5. **Tiles** ([`credit`]): by √v, with an even share for all.
 //!
@@ -209,11 +209,12 @@ impl State {
         now: Time,
         canvas: &Canvas,
         rest: usize,
-        temporal: f32,
         requests: &mut Vec<Request>,
     ) {
+        // As fronts: where everything changes, edges of shadows are not what is wrong most.
+        let wanted = self.front_share / FRONT_SHARE;
         let State { late, weights, rates, why, .. } = self;
-        late.choose(now, canvas, rest, wanted(temporal), |pixel| {
+        late.choose(now, canvas, rest, wanted, |pixel| {
             if weights.lets_pass(&rates.grid, pixel) {
                 why.set(pixel, Why::Late);
                 requests.push(Request::centre(pixel));
@@ -287,7 +288,7 @@ impl Sampler for Adaptive {
         }
         if without != Some(AdaptiveStage::Late) {
             let rest = count - (requests.len() - start);
-            state.choose_late(now, canvas, rest, self.temporal, requests);
+            state.choose_late(now, canvas, rest, requests);
         }
         let State { credit, refine, rates, why, owed, .. } = state;
         let left = (count - (requests.len() - start)) as f32;

@@ -1,0 +1,307 @@
+//! What large holes show: of the blocks of pixels around them, the finest that know enough, and the smoother the less is known.
+//!
+//! ```text
+//! pull   c = Σ w_i c_i / Σ w_i,  w = min(1, k · mean of w_i)      over 2×2 blocks, from pixels up to the whole picture
+//! push   c ← w c + (1 − w) c'                                    c' interpolated between the next coarser blocks
+//! ```
+//!
+//! w is 1 for a pixel that has samples or lies beside some, 0 for one in a large hole (Gortler et al. 1996, "The lumigraph"). Of a
+//! texture of variance σ² a neighbour's colour is off by 2σ² on average, a mean of many by σ²; and an edge that lies
+//! anywhere between two samples costs a third less under a ramp than under a step in the middle. k says how soon a block is thought to
+//! know enough. What the whole picture does not know is the `prior`.
+//!
+//! Blocks smaller than tiles of 8×8 pixels are looked at in and beside tiles with holes only; other tiles count with the pixels on
+//! their diagonal.
+
+use std::ops::Range;
+
+use super::fill::NOBODY;
+use crate::Size;
+
+/// A colour and its weight.
+type Block = [f32; 4];
+
+/// Side of a tile, as a power of two.
+const TILE_BITS: usize = 3;
+
+/// k up to tiles, where a block with a single sample knows enough, and beyond them, where even a whole one leaves half to what is
+/// around: what little survives a cut is not taken for the rest of the picture. With less, holes are smoother and show more of what is far
+/// away, and at last of the prior.
+const ENOUGH: [f32; 2] = [4.0, 0.5];
+
+/// k for blocks of 2^`bits` pixels.
+fn enough(bits: usize) -> f32 {
+    ENOUGH[usize::from(bits > TILE_BITS)]
+}
+
+/// Blocks of 2^l × 2^l pixels, row by row.
+#[derive(Default)]
+struct Level {
+    columns: usize,
+    rows: usize,
+    blocks: Vec<Block>,
+}
+
+/// Fills large holes.
+#[derive(Default)]
+pub(super) struct Smooth {
+    /// From blocks of 2×2 pixels on, up to a single block.
+    levels: Vec<Level>,
+    /// Per tile: whether it has holes, and whether it or one beside it has.
+    holed: Vec<bool>,
+    near: Vec<bool>,
+}
+
+impl Smooth {
+    /// `far`: the holes, which are [`NOBODY`] in `source`.
+    pub(super) fn run(
+        &mut self,
+        size: Size,
+        far: &[u32],
+        source: &[u32],
+        prior: [f32; 3],
+        picture: &mut [[f32; 3]],
+    ) {
+        if far.is_empty() {
+            return;
+        }
+        self.fit(size);
+        self.find_tiles(size, far);
+        self.pull_tiles(size, source, picture);
+        for l in TILE_BITS..self.levels.len() {
+            let (finer, coarser) = self.levels.split_at_mut(l);
+            let (finer, coarser) = (&finer[l - 1], &mut coarser[0]);
+            coarser.pull(enough(l + 1), finer, 0..coarser.columns, 0..coarser.rows);
+        }
+        let top = self.levels.last_mut().expect("a tile at least");
+        top.blocks.iter_mut().for_each(|block| *block = mixed(*block, prior));
+        self.push();
+        for &pixel in far {
+            let (x, y) = size.xy(pixel);
+            picture[pixel as usize] = self.levels[0].between(x as usize, y as usize);
+        }
+    }
+
+    fn fit(&mut self, size: Size) {
+        let longer = size.width.max(size.height).next_power_of_two();
+        self.levels.resize_with(TILE_BITS.max(longer.trailing_zeros() as usize), Level::default);
+        for (level, bits) in self.levels.iter_mut().zip(1..) {
+            level.columns = (size.width as usize).div_ceil(1 << bits);
+            level.rows = (size.height as usize).div_ceil(1 << bits);
+            level.blocks.resize(level.columns * level.rows, [0.0; 4]);
+        }
+    }
+
+    fn find_tiles(&mut self, size: Size, far: &[u32]) {
+        let Level { columns, rows, .. } = self.levels[TILE_BITS - 1];
+        for tiles in [&mut self.holed, &mut self.near] {
+            tiles.clear();
+            tiles.resize(columns * rows, false);
+        }
+        for &pixel in far {
+            let (x, y) = size.xy(pixel);
+            self.holed[(y as usize >> TILE_BITS) * columns + (x as usize >> TILE_BITS)] = true;
+        }
+        let beside = |at: usize, end: usize| at.saturating_sub(1)..(at + 2).min(end);
+        for tile in (0..columns * rows).filter(|&tile| self.holed[tile]) {
+            for y in beside(tile / columns, rows) {
+                for x in beside(tile % columns, columns) {
+                    self.near[y * columns + x] = true;
+                }
+            }
+        }
+    }
+
+    /// Up to the blocks that are tiles.
+    fn pull_tiles(&mut self, size: Size, source: &[u32], picture: &[[f32; 3]]) {
+        let width = size.width as usize;
+        let pixel = |x: usize, y: usize| {
+            let ([r, g, b], i) = (picture[y * width + x], y * width + x);
+            [r, g, b, if source[i] == NOBODY { 0.0 } else { 1.0 }]
+        };
+        let (fine, tiles) = self.levels.split_at_mut(TILE_BITS - 1);
+        let Level { columns, ref mut blocks, .. } = tiles[0];
+        for (tile, block) in blocks.iter_mut().enumerate() {
+            let (x, y) = (tile % columns, tile / columns);
+            let xs = x << TILE_BITS..((x + 1) << TILE_BITS).min(width);
+            let ys = y << TILE_BITS..((y + 1) << TILE_BITS).min(size.height as usize);
+            if !self.near[tile] {
+                *block = pulled(1.0, xs.zip(ys).map(|(x, y)| pixel(x, y)));
+                continue;
+            }
+            let halved = |range: &Range<usize>, bits: usize| {
+                range.start >> bits..range.end.div_ceil(1 << bits)
+            };
+            for (y, x) in pairs(halved(&ys, 1), halved(&xs, 1)) {
+                let children = pairs(twice(y, ys.end), twice(x, xs.end)).map(|(y, x)| pixel(x, y));
+                fine[0].blocks[y * fine[0].columns + x] = pulled(enough(1), children);
+            }
+            for l in 1..TILE_BITS - 1 {
+                let (finer, coarser) = fine.split_at_mut(l);
+                coarser[0].pull(
+                    enough(l + 1),
+                    &finer[l - 1],
+                    halved(&xs, l + 1),
+                    halved(&ys, l + 1),
+                );
+            }
+            let finest = &fine[TILE_BITS - 2];
+            *block = pulled(enough(TILE_BITS), finest.children(x, y));
+        }
+    }
+
+    /// From the coarsest blocks to the finest; those smaller than tiles only in tiles with holes.
+    fn push(&mut self) {
+        let (tile_columns, tile_rows) = {
+            let tiles = &self.levels[TILE_BITS - 1];
+            (tiles.columns, tiles.rows)
+        };
+        for l in (0..self.levels.len() - 1).rev() {
+            let (finer, coarser) = self.levels.split_at_mut(l + 1);
+            let (finer, coarser) = (&mut finer[l], &coarser[0]);
+            if l >= TILE_BITS - 1 {
+                finer.push(coarser, 0..finer.columns, 0..finer.rows);
+                continue;
+            }
+            let per_tile = 1 << (TILE_BITS - 1 - l);
+            for (y, x) in pairs(0..tile_rows, 0..tile_columns) {
+                if self.holed[y * tile_columns + x] {
+                    let blocks =
+                        |at: usize, end: usize| at * per_tile..((at + 1) * per_tile).min(end);
+                    finer.push(coarser, blocks(x, finer.columns), blocks(y, finer.rows));
+                }
+            }
+        }
+    }
+}
+
+impl Level {
+    /// From the next finer level.
+    fn pull(&mut self, k: f32, finer: &Level, columns: Range<usize>, rows: Range<usize>) {
+        for (y, x) in pairs(rows, columns) {
+            self.blocks[y * self.columns + x] = pulled(k, finer.children(x, y));
+        }
+    }
+
+    /// From the next coarser level.
+    fn push(&mut self, coarser: &Level, columns: Range<usize>, rows: Range<usize>) {
+        for (y, x) in pairs(rows, columns) {
+            let block = &mut self.blocks[y * self.columns + x];
+            if block[3] < 1.0 {
+                *block = mixed(*block, coarser.between(x, y));
+            }
+        }
+    }
+
+    /// Of a block of the next coarser level.
+    fn children(&self, x: usize, y: usize) -> impl Iterator<Item = Block> {
+        let children = pairs(twice(y, self.rows), twice(x, self.columns));
+        children.map(|(y, x)| self.blocks[y * self.columns + x])
+    }
+
+    /// Interpolated at the centre of a block, or pixel, of the next finer level: a quarter of a block beside that of its own.
+    fn between(&self, x: usize, y: usize) -> [f32; 3] {
+        let own_and_beside = |i: usize, end: usize| {
+            let beside = if i.is_multiple_of(2) { (i / 2).saturating_sub(1) } else { i / 2 + 1 };
+            [i / 2, beside.min(end - 1)]
+        };
+        let ([x, u], [y, v]) = (own_and_beside(x, self.columns), own_and_beside(y, self.rows));
+        let at = |x, y| self.blocks[y * self.columns + x];
+        let [a, b, c, d] = [at(x, y), at(u, y), at(x, v), at(u, v)];
+        std::array::from_fn(|k| (9.0 * a[k] + 3.0 * (b[k] + c[k]) + d[k]) * (1.0 / 16.0))
+    }
+}
+
+/// All (y, x), row by row.
+fn pairs(ys: Range<usize>, xs: Range<usize>) -> impl Iterator<Item = (usize, usize)> {
+    ys.flat_map(move |y| xs.clone().map(move |x| (y, x)))
+}
+
+/// The two of the next finer level, as far as there are.
+fn twice(i: usize, end: usize) -> Range<usize> {
+    2 * i..(2 * i + 2).min(end)
+}
+
+fn pulled(k: f32, children: impl Iterator<Item = Block>) -> Block {
+    let (mut sum, mut count) = ([0.0; 4], 0.0);
+    for [r, g, b, w] in children {
+        sum = [sum[0] + w * r, sum[1] + w * g, sum[2] + w * b, sum[3] + w];
+        count += 1.0;
+    }
+    let [r, g, b, w] = sum;
+    let per_weight = if w > 0.0 { 1.0 / w } else { 0.0 };
+    [r * per_weight, g * per_weight, b * per_weight, (k * w / count).min(1.0)]
+}
+
+/// As much of another colour as the block does not know.
+fn mixed([r, g, b, w]: Block, other: [f32; 3]) -> Block {
+    let mix = |own: f32, other: f32| w * own + (1.0 - w) * other;
+    [mix(r, other[0]), mix(g, other[1]), mix(b, other[2]), 1.0]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: Size = Size { width: 45, height: 37 };
+
+    /// What is shown where `known` is false, as (x, y, colour), the others showing `colour`.
+    fn filled(
+        known: impl Fn(u32, u32) -> bool,
+        colour: impl Fn(u32, u32) -> f32,
+        prior: f32,
+    ) -> Vec<(u32, u32, f32)> {
+        let pixels = 0..SIZE.pixels() as u32;
+        let is_known = |&pixel: &u32| known(SIZE.xy(pixel).0, SIZE.xy(pixel).1);
+        let far: Vec<u32> = pixels.clone().filter(|pixel| !is_known(pixel)).collect();
+        let source: Vec<u32> =
+            pixels.clone().map(|pixel| if is_known(&pixel) { pixel } else { NOBODY }).collect();
+        let shown = |pixel| {
+            let (x, y) = SIZE.xy(pixel);
+            if known(x, y) { [colour(x, y); 3] } else { [f32::NAN; 3] }
+        };
+        // What was there before counts nothing, as long as it is a number.
+        let mut picture: Vec<[f32; 3]> =
+            pixels.map(|pixel| shown(pixel).map(|c| if c.is_nan() { 99.0 } else { c })).collect();
+        Smooth::default().run(SIZE, &far, &source, [prior; 3], &mut picture);
+        let now = |&pixel: &u32| (SIZE.xy(pixel).0, SIZE.xy(pixel).1, picture[pixel as usize][0]);
+        far.iter().map(now).collect()
+    }
+
+    #[test]
+    fn where_everything_around_is_alike_so_is_the_hole() {
+        let is_known = |x: u32, y: u32| !(7..30).contains(&x) || !(9..20).contains(&y);
+        for (x, y, c) in filled(is_known, |_, _| 0.25, 0.25) {
+            assert!((c - 0.25).abs() < 1e-6, "{x}, {y}: {c}");
+        }
+    }
+
+    #[test]
+    fn where_nothing_is_known_the_prior_is_shown() {
+        assert!(filled(|_, _| false, |_, _| 0.0, 0.75).iter().all(|pixel| pixel.2 == 0.75));
+    }
+
+    #[test]
+    fn between_sparse_samples_of_a_ramp_there_is_about_the_ramp() {
+        let ramp = |x: u32, y: u32| (x as f32 + 0.5 * y as f32) / 64.0;
+        let is_inside = |x: u32, y: u32| (8..37).contains(&x) && (8..29).contains(&y);
+        let filled = filled(|x, y| x % 4 == 1 && y % 4 == 2, ramp, 0.5);
+        let inside = filled.iter().filter(|(x, y, _)| is_inside(*x, *y));
+        let off: Vec<f32> = inside.map(|&(x, y, c)| (c - ramp(x, y)).abs()).collect();
+        // The nearest sample would be off by up to two columns and two rows: 3/64.
+        assert!(off.iter().all(|&off| off < 2.5 / 64.0), "{off:?}");
+        assert!(off.iter().sum::<f32>() / (off.len() as f32) < 1.0 / 64.0);
+    }
+
+    #[test]
+    fn a_hole_between_dark_and_light_goes_from_one_to_the_other() {
+        let is_known = |x: u32, _| !(10..35).contains(&x);
+        let row: Vec<f32> = filled(is_known, |x, _| f32::from(x >= 35), 0.5)
+            .into_iter()
+            .filter(|pixel| pixel.1 == 18)
+            .map(|pixel| pixel.2)
+            .collect();
+        assert!(row.windows(2).all(|pair| pair[0] <= pair[1] + 1e-6), "{row:?}");
+        assert!(row[0] < 0.25 && row[24] > 0.75, "{row:?}");
+    }
+}
