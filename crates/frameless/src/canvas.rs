@@ -113,6 +113,11 @@ impl Canvas {
         self.samples_wanted
     }
 
+    /// Whether samples are added for as long as a pixel rests, since the renderer has noise.
+    pub fn adds_without_end(&self) -> bool {
+        self.samples_wanted == u16::MAX
+    }
+
     /// Spatial contrast of every tile of the sampler's [`Rates`](crate::Rates) in the picture before the last: mean squared difference of
     /// neighbouring pixels, per channel, display-referred. Empty if nobody has said.
     pub fn tile_contrast(&self) -> &[f32] {

@@ -2,7 +2,9 @@
 
 mod world;
 
-use frameless::{Display, ReconstructionKind, ReprojectOptions, Request, SamplerKind};
+use frameless::{
+    Display, Engine, ReconstructionKind, ReprojectOptions, ReprojectStage, Request, SamplerKind,
+};
 use world::*;
 
 const ANTIALIAS: ReconstructionKind = ReconstructionKind::Reproject(ReprojectOptions {
@@ -89,6 +91,42 @@ fn a_noisy_picture_at_rest_converges_like_a_plain_mean() {
         eprintln!("{samples_per_pixel} samples per pixel: {ours}, evenly {evenly}");
         assert!(ours < 1.03 * evenly);
     }
+}
+
+#[test]
+fn few_noisy_samples_borrow_from_those_around() {
+    let world = World { noise: 0.6, ..world(STILL, NO_DISC) };
+    let error = |without: Option<ReprojectStage>| {
+        let options = ReprojectOptions { antialias: true, without, ..ReprojectOptions::default() };
+        let kind = ReconstructionKind::Reproject(options);
+        let mut engine = engine(world, kind, 8.0 * SIZE.pixels() as f64);
+        let (picture, secs) = play(&mut engine, 60);
+        rmse(&picture, &world.ideal(secs))
+    };
+    let [with, alone] = [None, Some(ReprojectStage::Borrow)].map(error);
+    assert!(with < 0.75 * alone, "{with}, alone {alone}");
+}
+
+#[test]
+fn who_begins_anew_is_soon_level_with_the_others() {
+    let light = |secs: f64, [x, _]: [f32; 2]| if secs > 1.5 && x < 12.0 { 0.4 } else { 1.0 };
+    let world = World { light, noise: 0.6, ..world(STILL, NO_DISC) };
+    let samples_per_sec = 20.0 * SIZE.pixels() as f64;
+    let mut engine = engine(world, ANTIALIAS, samples_per_sec);
+    play(&mut engine, 90);
+    let mean = |engine: &Engine<Renderer>, columns: std::ops::Range<u32>| {
+        let is_there = |pixel: &u32| columns.contains(&(pixel % SIZE.width));
+        let pixels: Vec<u32> = (0..SIZE.pixels() as u32).filter(is_there).collect();
+        let counts = pixels.iter().map(|&p| f32::from(engine.canvas().samples()[p as usize]));
+        counts.sum::<f32>() / pixels.len() as f32
+    };
+    let before = mean(&engine, 14..96);
+    assert!((24.0..34.0).contains(&before), "{before}");
+    // An eighth of the picture wants 30 samples each, of the 20 for each pixel of it all in a second.
+    play(&mut engine, 24);
+    let [anew, others] = [mean(&engine, 0..10), mean(&engine, 14..96)];
+    assert!(anew > 0.6 * others, "{anew}, others {others}");
+    assert!(others >= before);
 }
 
 #[test]

@@ -6,6 +6,7 @@
 //! land on pixel centres at the next refresh ([`aim`]).
 
 mod aim;
+mod borrow;
 mod cells;
 mod covers;
 mod cracks;
@@ -310,6 +311,9 @@ impl Reproject {
         }
         if self.samples_wanted(refresh) > 0 {
             self.settled.show(&mut self.store, &self.relight, refresh, picture);
+        }
+        if refresh.is_noisy && self.options.without != Some(ReprojectStage::Borrow) {
+            self.settled.borrow(&self.store, refresh, picture);
         }
         self.shown.clone_from(picture);
     }

@@ -15,6 +15,7 @@
 //! n ← min(n, σ² / δ²)                  δ² the squared change of the sample at the centre
 //! ```
 
+use super::borrow::{self, Borrow};
 use super::relight::Relight;
 use super::residual::squared;
 use super::rest::{self, Rest};
@@ -35,6 +36,9 @@ pub(super) struct Settled {
     grid: Option<TileGrid>,
     /// Per tile: the variance of a pixel's samples.
     noise: Vec<f32>,
+    /// Per tile: the mean of how many samples that is, as far as it is known.
+    noise_samples: Vec<u8>,
+    borrow: Borrow,
     /// Scratch memory: per first cell of a pixel 1 if something moves in it.
     moving: Vec<u8>,
     /// Scratch memory, of each band of rows: cells that take over their pixel's mean, and which.
@@ -57,8 +61,10 @@ const SAME: f32 = 1e-6;
 const BEYOND_NOISE: f32 = 9.0;
 /// Before much is known of a pixel it is thought to spread by this (Σ over the channels): 9 % of the range.
 const FIRST_SPREAD: f32 = 0.025;
-/// How much of a tile's noise each sample renews.
-const NOISE_MEMORY: f32 = 1.0 / 64.0;
+/// A tile's noise is the mean over its last samples: about so many.
+const NOISE_MEMORY: u8 = 64;
+/// Of fewer samples a pixel's own variance says nothing.
+const KNOWN_SPREAD: u16 = 4;
 const TILE: u32 = 8;
 /// A sample this many standard deviations off, squared, makes a pixel suspect.
 const SUSPECT: f32 = 9.0;
@@ -93,6 +99,7 @@ impl Settled {
         self.spread = vec![0.0; size.pixels()];
         self.encoded = vec![[0.0; 3]; size.pixels()];
         self.noise = vec![0.0; grid.len()];
+        self.noise_samples = vec![0; grid.len()];
         self.grid = Some(grid);
     }
 
@@ -157,7 +164,9 @@ impl Settled {
         let suspect = deviation > SUSPECT * (self.spread[pixel] + FIRST_SPREAD) / n;
         self.spread[pixel] += deviation;
         if let Some(tile) = tile {
-            self.noise[tile] += NOISE_MEMORY * (deviation - self.noise[tile]);
+            self.noise_samples[tile] = (self.noise_samples[tile] + 1).min(NOISE_MEMORY);
+            let part = 1.0 / f32::from(self.noise_samples[tile]);
+            self.noise[tile] += part * (deviation - self.noise[tile]);
         }
         if self.count[pixel] == MOST_SAMPLES {
             self.keep_only(pixel, MOST_SAMPLES / 2);
@@ -288,6 +297,36 @@ impl Settled {
             self.begin_around(store, relight, [x, y], refresh.display);
         }
         self.left = left;
+    }
+
+    /// After [`Settled::show`], of a renderer with noise: means of few samples borrow from those around.
+    pub(super) fn borrow(
+        &mut self,
+        store: &Store,
+        refresh: &Refresh<'_>,
+        picture: &mut [[f32; 3]],
+    ) {
+        let mut borrow = std::mem::take(&mut self.borrow);
+        let means = |pixel: usize| {
+            (self.count[pixel] > 0).then(|| borrow::Mean {
+                linear: self.mean(pixel),
+                encoded: self.encoded[pixel],
+                variance: self.variance(pixel) / f32::from(self.count[pixel]),
+            })
+        };
+        borrow.run(store, refresh.display, refresh.threads, means, picture);
+        self.borrow = borrow;
+    }
+
+    /// σ² of a pixel at rest, Σ over the channels: the tile's, or its own where it is larger and known.
+    fn variance(&self, pixel: usize) -> f32 {
+        let tile = self.grid.as_ref().map(|grid| grid.tile_of(pixel as u32));
+        let known = tile.filter(|&tile| self.noise_samples[tile] > 0);
+        let of_tile = known.map_or(FIRST_SPREAD, |tile| self.noise[tile]);
+        match self.count[pixel] {
+            n if n < KNOWN_SPREAD => of_tile,
+            n => of_tile.max(self.spread[pixel] / f32::from(n - 1)),
+        }
     }
 
     /// The pixels beside one whose sample at the centre has changed or gone begin anew.

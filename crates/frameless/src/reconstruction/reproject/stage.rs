@@ -15,17 +15,20 @@ pub enum ReprojectStage {
     Gather,
     /// Tracing pixels again that samples beside their centres show, once nothing moves.
     Recentre,
+    /// Borrowing: without, pixels at rest of a renderer with noise show their own means, however few samples these are of.
+    Borrow,
 }
 
 impl ReprojectStage {
     /// All, in the order of the data.
-    pub const ALL: [ReprojectStage; 6] = [
+    pub const ALL: [ReprojectStage; 7] = [
         ReprojectStage::Aim,
         ReprojectStage::Range,
         ReprojectStage::Cracks,
         ReprojectStage::Covers,
         ReprojectStage::Gather,
         ReprojectStage::Recentre,
+        ReprojectStage::Borrow,
     ];
 
     /// As in `reproject(without=aim)`.
@@ -37,6 +40,7 @@ impl ReprojectStage {
             ReprojectStage::Covers => "covers",
             ReprojectStage::Gather => "gather",
             ReprojectStage::Recentre => "recentre",
+            ReprojectStage::Borrow => "borrow",
         }
     }
 

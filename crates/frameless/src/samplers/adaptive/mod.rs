@@ -244,8 +244,14 @@ impl State {
         tile as u32
     }
 
-    fn observe_refinement(&mut self, observed: &Observation, tile: usize, refinement: &Refinement) {
-        self.refine.observe(tile, refinement, self.weights.of_tile(tile));
+    fn observe_refinement(
+        &mut self,
+        observed: &Observation,
+        tile: usize,
+        n: u16,
+        refinement: &Refinement,
+    ) {
+        self.refine.observe(tile, n, refinement, self.weights.of_tile(tile));
         if refinement.suspect {
             self.front.suspect(observed);
         }
@@ -316,7 +322,10 @@ impl Sampler for Adaptive {
         tiles.extend(observations.iter().map(|observed| state.fetch(observed)));
         for (observed, &tile) in observations.iter().zip(&tiles) {
             match &observed.refinement {
-                Some(refinement) => state.observe_refinement(observed, tile as usize, refinement),
+                Some(refinement) => {
+                    let n = canvas.samples()[observed.pixel as usize];
+                    state.observe_refinement(observed, tile as usize, n, refinement);
+                }
                 None if observed.known => state.observe_change(observed, tile as usize),
                 None => {}
             }

@@ -1,18 +1,24 @@
 //! What is at rest is refined: more samples for pixels that show the mean of a few.
 //!
 //! ```text
-//! share of tile i = u_i m_i σ_i / Σ u m σ
+//! share of tile i ∝ u_i (m_i σ_i^(1+b) + ¼ σ̄^(1+b)),   σ̄² = mean σ²
+//! u_i = 1/N_i Σ_j 1/n_j^b                   over the tile's pixels j that are at rest and have not enough samples yet
+//! b = 3 of a renderer with noise, else 0
 //! ```
 //!
-//! σ²_i is the variance of a pixel's samples in the tile, by noise or because the pixel is not all one colour, and u_i the part of its
-//! pixels that are at rest and have not enough samples yet, m_i how much the tile counts ([`weights`](super::weights)). Samples in proportion to σ make Σ σ²/n least (Neyman 1934); some are
+//! σ²_i is the variance of a pixel's samples in the tile, by noise or because the pixel is not all one colour, N_i how many pixels it has, n_j of
+//! how many samples a pixel shows the mean, m_i how much the tile counts ([`weights`](super::weights)). Samples in proportion to σ make Σ σ²/n least (Neyman 1934); some are
 //! given out as if all tiles were alike, since σ itself is only an estimate.
+//!
+//! b: with noise pixels never have enough, and those that something has changed have begun anew among others that have hundreds of samples. Shares in proportion to
+//! σ (σ/n)^b lead to n ∝ σ for any b ≥ 0, too, since dn/dt = σ (σ/n)^b has the solution n^(1+b) ∝ σ^(1+b) t; the larger b, the more of the samples go to those that are
+//! behind until they are level. A pixel with a third of the others' samples counts 27 times as much. Within a tile those with the fewest come first.
 //!
 //! How many samples go to change and how many to refinement follows from what is to be gained, and from the control τ:
 //!
 //! ```text
 //! E_t = mean of v_i · age_i / 2            squared error by change since the samples were taken
-//! E_s = mean of u_i · σ²_i / n_i           squared error of means of n_i samples
+//! E_s = mean of σ²_i / n_j                 squared error of means of n_j samples
 //! temporal part = τ √E_t / (τ √E_t + (1 − τ) √E_s), at least ε
 //! ```
 
@@ -30,15 +36,18 @@ const FIRST_VARIANCE: f32 = 1e-3;
 const MEMORY: u16 = 256;
 /// Samples that the first guess of a tile's variance counts for.
 const FIRST_SAMPLES: u16 = 4;
-/// The part of √(mean σ²) that is added to every tile's σ.
+/// Of what a tile of mean variance has, the part that every tile gets beside its own.
 const EVENLY: f32 = 0.25;
+/// b of a renderer with noise. Less: pixels that begin anew take longer to be level with the others (b = 1: seconds); more changes little, and cubes are cheap.
+const BEHIND: i32 = 3;
 
 /// Variances of all tiles, and whose turn it is.
 pub(crate) struct Refine {
     tiles: Vec<TileNoise>,
+    behind: Behind,
     /// Σ σ².
     variance_sum: f64,
-    /// By u m σ, with u as the even part.
+    /// By u m σ^(1+b), with u as the even part.
     shares: Shares,
     order: Order,
     /// Per pixel the number of its last sample.
@@ -61,15 +70,48 @@ struct TileNoise {
     unfinished: f32,
 }
 
+/// How much more those count that have fewer samples than others.
+#[derive(Clone, Copy, PartialEq)]
+enum Behind {
+    /// b = 0.
+    Alike,
+    /// b = [`BEHIND`].
+    First,
+}
+
+impl Behind {
+    fn of(canvas: &Canvas) -> Behind {
+        if canvas.adds_without_end() { Behind::First } else { Behind::Alike }
+    }
+
+    /// x^(1+b).
+    fn power(self, x: f32) -> f32 {
+        match self {
+            Behind::Alike => x,
+            Behind::First => x.powi(1 + BEHIND),
+        }
+    }
+
+    /// 1/n^b.
+    fn urgency(self, n: u16) -> f32 {
+        match self {
+            Behind::Alike => 1.0,
+            Behind::First => (1.0 / f32::from(n)).powi(BEHIND),
+        }
+    }
+}
+
 impl TileNoise {
-    /// u m σ.
-    fn weight(&self, m: f32) -> f32 {
-        self.unfinished * m * self.variance.sqrt()
+    /// u m σ^(1+b).
+    fn weight(&self, m: f32, behind: Behind) -> f32 {
+        self.unfinished * m * behind.power(self.variance.sqrt())
     }
 }
 
 /// Pixels of a whole tile, from left to right.
 const SIDE: usize = 1 << super::TILE_BITS;
+/// Pixels of a whole tile.
+const TILE_PIXELS: f32 = (SIDE * SIDE) as f32;
 
 /// Pixels of a tile that want samples.
 #[derive(Clone, Copy, Default)]
@@ -77,6 +119,30 @@ struct Unfinished {
     pixels: u32,
     /// That they have already.
     samples: u32,
+}
+
+/// Those of a renderer with noise, all of which want samples.
+#[derive(Clone, Copy, Default)]
+struct Endless {
+    /// Σ 1/n.
+    error: f32,
+    /// Σ 1/n^b.
+    urgency: f32,
+}
+
+impl Endless {
+    fn of(canvas: &Canvas, rect: &TileRect) -> Endless {
+        let mut sums = Endless::default();
+        for y in rect.y0..rect.y1 {
+            let begin = canvas.size().index(rect.x0, y) as usize;
+            let row = &canvas.samples()[begin..begin + (rect.x1 - rect.x0) as usize];
+            for &n in row.iter().filter(|&&n| n > 0) {
+                sums.error += 1.0 / f32::from(n);
+                sums.urgency += Behind::First.urgency(n);
+            }
+        }
+        sums
+    }
 }
 
 impl Unfinished {
@@ -110,6 +176,7 @@ impl Refine {
             TileNoise { variance: FIRST_VARIANCE, samples: FIRST_SAMPLES, unfinished: 0.0 };
         Refine {
             tiles: vec![unknown; tiles],
+            behind: Behind::Alike,
             variance_sum: f64::from(FIRST_VARIANCE) * tiles as f64,
             shares: Shares::new(tiles, rng),
             order: Order::new(tiles, side_bits, rng),
@@ -131,16 +198,13 @@ impl Refine {
         for (index, n) in self.index.iter_mut().zip(canvas.samples()) {
             *index = if *n > 1 { *index } else { 0 };
         }
+        self.behind = Behind::of(canvas);
         let (mut spatial, mut temporal) = (0.0, 0.0);
         for tile in 0..self.tiles.len() {
-            let rect = rates.grid.rect(tile);
-            let unfinished = Unfinished::of(canvas, &rect);
-            let noise = &mut self.tiles[tile];
-            noise.unfinished = unfinished.pixels as f32 / rect.pixels() as f32;
-            if unfinished.pixels > 0 {
-                let per_pixel = unfinished.samples as f32 / unfinished.pixels as f32;
-                spatial += noise.unfinished * noise.variance / per_pixel;
-            }
+            spatial += match self.behind {
+                Behind::Alike => self.look_at_tile(canvas, rates, tile),
+                Behind::First => self.look_at_endless_tile(canvas, rates, tile),
+            };
             temporal += rates.of_tile(tile) * rates.mean_age_secs(tile) * 0.5;
         }
         let per_tile = 1.0 / self.tiles.len() as f32;
@@ -150,9 +214,33 @@ impl Refine {
         self.weigh_all(m);
     }
 
+    /// Returns the mean of σ²/n over the tile, n being the mean of its pixels.
+    fn look_at_tile(&mut self, canvas: &Canvas, rates: &Rates, tile: usize) -> f32 {
+        let rect = rates.grid.rect(tile);
+        let unfinished = Unfinished::of(canvas, &rect);
+        let noise = &mut self.tiles[tile];
+        noise.unfinished = unfinished.pixels as f32 / rect.pixels() as f32;
+        if unfinished.pixels == 0 {
+            return 0.0;
+        }
+        let per_pixel = unfinished.samples as f32 / unfinished.pixels as f32;
+        noise.unfinished * noise.variance / per_pixel
+    }
+
+    /// The same of a renderer with noise, with each pixel's own n.
+    fn look_at_endless_tile(&mut self, canvas: &Canvas, rates: &Rates, tile: usize) -> f32 {
+        let rect = rates.grid.rect(tile);
+        let Endless { error, urgency } = Endless::of(canvas, &rect);
+        let noise = &mut self.tiles[tile];
+        noise.unfinished = urgency / TILE_PIXELS;
+        noise.variance * error / TILE_PIXELS
+    }
+
     /// What tiles count has changed.
     pub(crate) fn weigh_all(&mut self, m: impl Fn(usize) -> f32) {
-        let share = |tile: usize| (self.tiles[tile].weight(m(tile)), self.tiles[tile].unfinished);
+        let share = |tile: usize| {
+            (self.tiles[tile].weight(m(tile), self.behind), self.tiles[tile].unfinished)
+        };
         self.shares.set_all(share);
     }
 
@@ -166,15 +254,19 @@ impl Refine {
         (change / (change + rest).max(f32::MIN_POSITIVE)).max(LEAST_TEMPORAL)
     }
 
-    /// `m`: how much the tile counts.
-    pub(crate) fn observe(&mut self, tile: usize, refinement: &Refinement, m: f32) {
+    /// Of a sample that was the `n`th of its pixel. `m`: how much the tile counts.
+    pub(crate) fn observe(&mut self, tile: usize, n: u16, refinement: &Refinement, m: f32) {
         let noise = &mut self.tiles[tile];
+        if self.behind == Behind::First && n > 1 {
+            let less = Behind::First.urgency(n - 1) - Behind::First.urgency(n);
+            noise.unfinished = (noise.unfinished - less / TILE_PIXELS).max(0.0);
+        }
         noise.samples = (noise.samples + 1).min(MEMORY);
         let part = 1.0 / f32::from(noise.samples);
         let change = part * (refinement.deviation - noise.variance);
         noise.variance += change;
         self.variance_sum += f64::from(change);
-        let weight = noise.weight(m);
+        let weight = noise.weight(m, self.behind);
         self.shares.set(tile, weight);
     }
 
@@ -194,7 +286,7 @@ impl Refine {
         mut take: impl FnMut(Request),
     ) {
         let mean = (self.variance_sum / self.tiles.len() as f64).max(0.0) as f32;
-        let evenly = EVENLY * mean.sqrt() + 1e-6;
+        let evenly = EVENLY * self.behind.power(mean.sqrt()) + 1e-6;
         let sums = self.shares.sums();
         let sum = sums.weight as f32 + evenly * sums.even as f32;
         if sum <= 0.0 {
@@ -212,12 +304,17 @@ impl Refine {
         self.drawn = drawn;
     }
 
-    /// The next pixel of a tile that wants a sample.
+    /// The next pixel of a tile that wants a sample; with noise one of those with the fewest.
     fn next(&mut self, canvas: &Canvas, grid: &TileGrid, tile: usize) -> Option<Request> {
-        for _ in 0..grid.rect(tile).pixels() {
+        let rect = grid.rect(tile);
+        let most = match self.behind {
+            Behind::Alike => canvas.samples_wanted() - 1,
+            Behind::First => fewest(canvas, &rect)?,
+        };
+        for _ in 0..rect.pixels() {
             let pixel = self.order.next(grid, tile);
             let n = canvas.samples()[pixel as usize];
-            if n > 0 && n < canvas.samples_wanted() {
+            if n > 0 && n <= most {
                 let index = &mut self.index[pixel as usize];
                 *index += 1;
                 return Some(Request::in_sequence(pixel, *index));
@@ -225,6 +322,17 @@ impl Refine {
         }
         None
     }
+}
+
+/// The least number of samples of a tile's pixels at rest.
+fn fewest(canvas: &Canvas, rect: &TileRect) -> Option<u16> {
+    let rows = (rect.y0..rect.y1).map(|y| {
+        let begin = canvas.size().index(rect.x0, y) as usize;
+        &canvas.samples()[begin..begin + (rect.x1 - rect.x0) as usize]
+    });
+    // Those that do not rest have 0, which wraps to more than any other has.
+    let least = rows.flatten().map(|n| n.wrapping_sub(1)).min()?;
+    (least < u16::MAX).then_some(least + 1)
 }
 
 #[cfg(test)]
