@@ -311,7 +311,8 @@ impl Settled {
             (self.count[pixel] > 0).then(|| borrow::Mean {
                 linear: self.mean(pixel),
                 encoded: self.encoded[pixel],
-                variance: self.variance(pixel) / f32::from(self.count[pixel]),
+                variance: self.variance(pixel),
+                count: self.count[pixel],
             })
         };
         borrow.run(store, refresh.display, refresh.threads, means, picture);
