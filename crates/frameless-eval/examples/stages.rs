@@ -52,7 +52,7 @@ fn carrying(album: &Album) -> Result<(), Failure> {
     let gathered = play(&mut engine, SECS)?;
     let known = engine.canvas().known();
     let carried = std::mem::take(&mut *carried.lock().expect("nobody panicked"));
-    let black = carried.iter().zip(known).map(|(&rgb, &known)| if known { rgb } else { [0.0; 3] });
+    let black = carried.iter().zip(known).map(|(&rgb, known)| if known { rgb } else { [0.0; 3] });
     album.save("carried", &black.collect(), cut)?;
     album.save("gathered", &gathered, cut)?;
     let rates = engine.rates().ok_or("adaptive learns rates")?;

@@ -71,12 +71,11 @@ impl PyCanvas {
         self.shared.with(py, |state| state.engine.tracer_mut().camera = camera)
     }
 
-    /// When each pixel was traced last, in seconds, 0 if never: float64, shape (height · width,), a copy.
+    /// When each pixel was traced last, in seconds, rounded down to 16 µs, 0 if never: float64, shape (height · width,), a copy.
     #[getter]
     fn time<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let time = self.shared.with(py, |state| {
-            state.engine.canvas().time().iter().map(|time| time.secs()).collect()
-        })?;
+        let time =
+            self.shared.with(py, |state| state.engine.canvas().time().map(Time::secs).collect())?;
         Ok(array::column(py, time))
     }
 
@@ -90,7 +89,7 @@ impl PyCanvas {
     /// Whether anything is known of each pixel: bool, shape (height · width,), a copy.
     #[getter]
     fn known<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        let known = self.shared.with(py, |state| state.engine.canvas().known().to_vec())?;
+        let known = self.shared.with(py, |state| state.engine.canvas().known().collect())?;
         Ok(array::column(py, known))
     }
 

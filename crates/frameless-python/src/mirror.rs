@@ -75,9 +75,9 @@ impl Mirror {
     }
 
     fn new(py: Python<'_>, canvas: &Canvas, of: (u32, u64)) -> PyResult<Mirror> {
-        let time = array::column(py, canvas.time().iter().map(|time| time.secs()).collect());
+        let time = array::column(py, canvas.time().map(Time::secs).collect());
         let rgb = array::rows(py, canvas.rgb().to_vec())?;
-        let known = array::column(py, canvas.known().to_vec());
+        let known = array::column(py, canvas.known().collect());
         let holes = array::column(py, canvas.holes().to_vec());
         let size = (canvas.size().width, canvas.size().height);
         let view = CanvasView {
@@ -103,10 +103,10 @@ impl Mirror {
         let mut known = self.known.bind(py).try_readwrite()?;
         let (mut time, mut rgb, mut known) =
             (time.as_array_mut(), rgb.as_array_mut(), known.as_array_mut());
-        for pixel in samples.iter().map(|sample| sample.pixel as usize) {
-            let traced: Time = canvas.time()[pixel];
-            time[pixel] = traced.secs();
-            known[pixel] = canvas.known()[pixel];
+        for Observation { pixel: number, .. } in samples {
+            let pixel = *number as usize;
+            time[pixel] = canvas.time_of(*number).secs();
+            known[pixel] = canvas.is_known(*number);
             (0..3).for_each(|k| rgb[[pixel, k]] = canvas.rgb()[pixel][k]);
         }
         Ok(())

@@ -44,8 +44,8 @@ pub(crate) fn age<'py>(
     let (size, age) = shared.with(py, |state| {
         let now = now.unwrap_or_else(|| state.engine.now());
         let canvas = state.engine.canvas();
-        let traced = canvas.time().iter().zip(canvas.known());
-        let age = traced.map(|(&time, &known)| match known {
+        let traced = canvas.time().zip(canvas.known());
+        let age = traced.map(|(time, known)| match known {
             true => now.secs_since(time) as f32,
             false => f32::INFINITY,
         });
@@ -67,7 +67,7 @@ pub(crate) fn change<'py>(py: Python<'py>, shared: &Shared) -> PyResult<Bound<'p
 pub(crate) fn known<'py>(py: Python<'py>, shared: &Shared) -> PyResult<Bound<'py, PyArray2<bool>>> {
     let (size, known) = shared.with(py, |state| {
         let canvas = state.engine.canvas();
-        (canvas.size(), canvas.known().to_vec())
+        (canvas.size(), canvas.known().collect())
     })?;
     array::plane(py, size, known)
 }

@@ -86,12 +86,12 @@ impl HeatMaps {
                 Some(paint(rgba, "change d (squared sRGB difference)", Some(CHANGE), values))
             }
             Overlay::SourceAge => {
-                let age_secs = |&traced: &Time| match traced {
+                let age_secs = |traced: Time| match traced {
                     Time::ZERO => f32::INFINITY,
                     traced => now.secs_since(traced) as f32,
                 };
-                let ages = engine.canvas().time().iter().map(age_secs);
-                Some(paint(rgba, "age of the sample shown (s)", None, ages))
+                let ages: Vec<f32> = engine.canvas().time().map(age_secs).collect();
+                Some(paint(rgba, "age of the sample shown (s)", None, ages.iter().copied()))
             }
             Overlay::SamplingRate => {
                 let rate = engine.tracer_mut().rate(now, size).per_sec();
@@ -130,10 +130,9 @@ impl HeatMaps {
 fn paint_holes(rgba: &mut [[u8; 4]], canvas: &Canvas) -> Drawn {
     for (rgba, known) in rgba.iter_mut().zip(canvas.known()) {
         let [r, g, b, _] = *rgba;
-        *rgba = if *known { [r / 3, g / 3, b / 3, 255] } else { UNKNOWN };
+        *rgba = if known { [r / 3, g / 3, b / 3, 255] } else { UNKNOWN };
     }
-    let is_off_centre =
-        |&&pixel: &&u32| canvas.known()[pixel as usize] && canvas.still_waits(pixel);
+    let is_off_centre = |&&pixel: &&u32| canvas.is_known(pixel) && canvas.still_waits(pixel);
     for &pixel in canvas.holes().iter().filter(is_off_centre) {
         rgba[pixel as usize] = WAITING;
     }

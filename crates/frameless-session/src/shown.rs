@@ -34,7 +34,7 @@ impl Shown {
         Shown {
             of: of(canvas, display),
             rgba: canvas.rgb().iter().map(|&rgb| display.encode_rgba8(rgb)).collect(),
-            times: canvas.time().to_vec(),
+            times: canvas.time().collect(),
         }
     }
 
@@ -48,7 +48,7 @@ impl Shown {
             return;
         }
         let shown = self.rgba.iter_mut().zip(&mut self.times);
-        for ((rgba, shown), (&rgb, &time)) in shown.zip(canvas.rgb().iter().zip(canvas.time())) {
+        for ((rgba, shown), (&rgb, time)) in shown.zip(canvas.rgb().iter().zip(canvas.time())) {
             if *shown != time {
                 *shown = time;
                 *rgba = display.encode_rgba8(rgb);
@@ -64,22 +64,14 @@ impl Shown {
 
 /// Mean and largest age of a canvas.
 pub(crate) fn ages(canvas: &Canvas, now: Time) -> Ages {
-    let mut traced = 0usize;
-    let mut sum_secs = 0.0;
-    let mut oldest = now;
-    // Row by row: a row's ages in nanoseconds fit an integer for 3 days, and sums of integers are fast.
-    for row in canvas.time().chunks(canvas.size().width as usize) {
-        let of_row = row.iter().filter(|&&time| time != Time::ZERO);
-        let (count, sum, min) = of_row.fold((0usize, 0u64, now), |(count, sum, min), &time| {
-            (count + 1, sum.saturating_add(now.0.saturating_sub(time.0)), min.min(time))
+    let traced = canvas.time().filter(|&time| time != Time::ZERO);
+    let (count, sum_nanos, oldest) =
+        traced.fold((0u64, 0u128, now), |(count, sum, oldest), time| {
+            (count + 1, sum + u128::from(now.0.saturating_sub(time.0)), oldest.min(time))
         });
-        traced += count;
-        sum_secs += sum as f64 * 1e-9;
-        oldest = oldest.min(min);
-    }
     Ages {
-        mean_secs: if traced > 0 { sum_secs / traced as f64 } else { 0.0 },
+        mean_secs: if count > 0 { sum_nanos as f64 * 1e-9 / count as f64 } else { 0.0 },
         max_secs: now.secs_since(oldest),
-        unknown: canvas.known().iter().filter(|&&known| !known).count(),
+        unknown: canvas.known().filter(|&known| !known).count(),
     }
 }

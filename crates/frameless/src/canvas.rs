@@ -1,5 +1,6 @@
 //! The samples kept: the newest of every pixel.
 
+use crate::traced::{Mark, TileMarks, Traced};
 use crate::wide;
 use crate::{Size, Time};
 
@@ -9,8 +10,7 @@ pub struct Canvas {
     size: Size,
     generation: u32,
     rgb: Vec<[f32; 3]>,
-    time: Vec<Time>,
-    known: Vec<bool>,
+    traced: Traced,
     holes: Vec<u32>,
     last_minute: Vec<u32>,
     updates: u64,
@@ -25,7 +25,7 @@ impl Canvas {
     /// A black canvas on which no pixel has been traced yet (all times [`Time::ZERO`]).
     pub fn new(size: Size) -> Canvas {
         let mut canvas = Canvas::from_picture(size, vec![[0.0; 3]; size.pixels()]);
-        canvas.known.fill(false);
+        canvas.traced = Traced::new(size, false);
         canvas.holes = coarse_to_fine(size);
         canvas.updates = 1;
         canvas
@@ -41,8 +41,7 @@ impl Canvas {
             size,
             generation: 0,
             rgb,
-            time: vec![Time::ZERO; size.pixels()],
-            known: vec![true; size.pixels()],
+            traced: Traced::new(size, true),
             holes: Vec::new(),
             last_minute: Vec::new(),
             updates: 0,
@@ -70,16 +69,37 @@ impl Canvas {
         &self.rgb
     }
 
-    /// When each pixel was traced last, row-major; [`Time::ZERO`]: never. Samples that are added to others of a pixel at rest
-    /// do not count: they do not tell whether anything has changed.
-    pub fn time(&self) -> &[Time] {
-        &self.time
+    /// When each pixel was traced last, row-major; [`Time::ZERO`]: never. Times are kept in units of 2¹⁴ ns (16 µs), rounded down, and no
+    /// longer than nine hours. Samples that are added to others of a pixel at rest do not count: they do not tell whether anything has
+    /// changed.
+    pub fn time(&self) -> impl Iterator<Item = Time> {
+        self.traced.marks().map(|mark| self.traced.time(mark))
+    }
+
+    /// As [`Canvas::time`], of one pixel.
+    pub fn time_of(&self, pixel: u32) -> Time {
+        self.traced.time(self.mark(pixel))
     }
 
     /// Per pixel whether anything is known of what it shows, row-major: not before it is traced first, and not where
     /// something has moved away, until what was behind it has been traced.
-    pub fn known(&self) -> &[bool] {
-        &self.known
+    pub fn known(&self) -> impl Iterator<Item = bool> {
+        self.traced.marks().map(Mark::is_known)
+    }
+
+    /// As [`Canvas::known`], of one pixel.
+    pub fn is_known(&self, pixel: u32) -> bool {
+        self.mark(pixel).is_known()
+    }
+
+    /// When all pixels were traced, tile by tile.
+    pub(crate) fn traced(&self) -> &Traced {
+        &self.traced
+    }
+
+    #[inline(always)]
+    fn mark(&self, pixel: u32) -> Mark {
+        self.traced.mark(self.traced.place(pixel))
     }
 
     /// Pixels that wait to be traced, the most urgent first: those of which nothing is known, then those that are shown by
@@ -100,7 +120,8 @@ impl Canvas {
 
     /// Whether a pixel has not been traced since [`Canvas::holes`] was made.
     pub fn still_waits(&self, pixel: u32) -> bool {
-        !self.known[pixel as usize] || self.time[pixel as usize] <= self.shown_at
+        let mark = self.mark(pixel);
+        !mark.is_known() || Mark::at(self.shown_at).since(mark) >= 0
     }
 
     /// Of how many samples each pixel shows the mean, row-major; 0 where the picture does not rest.
@@ -140,19 +161,11 @@ impl Canvas {
     /// old vectors are handed back, to be used again.
     ///
     /// # Panics
-    /// If `time` and `known` do not have one entry per pixel.
-    pub(crate) fn update(
-        &mut self,
-        now: Time,
-        holes: &mut Vec<u32>,
-        time: &mut Vec<Time>,
-        known: &mut Vec<bool>,
-    ) {
-        assert_eq!((time.len(), known.len()), (self.size.pixels(), self.size.pixels()));
+    /// If there is not one mark per pixel.
+    pub(crate) fn update(&mut self, now: Time, holes: &mut Vec<u32>, marks: &mut Vec<TileMarks>) {
         self.shown_at = now;
         std::mem::swap(&mut self.holes, holes);
-        std::mem::swap(&mut self.time, time);
-        std::mem::swap(&mut self.known, known);
+        self.traced.swap(now, marks);
         self.updates += 1;
     }
 
@@ -183,26 +196,24 @@ impl Canvas {
     pub(crate) fn prefetch(&self, pixel: u32) {
         let i = pixel as usize;
         wide::prefetch(&self.rgb, i);
-        wide::prefetch(&self.time, i);
-        wide::prefetch(&self.known, i);
         wide::prefetch(&self.samples, i);
+        self.traced.prefetch(self.traced.place(pixel));
     }
 
     /// A sample has been added to those of a pixel at rest; returns the time and colour of the one at its centre, which stays.
     pub(crate) fn refine(&mut self, pixel: u32) -> (Time, [f32; 3]) {
         let i = pixel as usize;
         self.samples[i] = self.samples[i].saturating_add(1);
-        (self.time[i], self.rgb[i])
+        (self.time_of(pixel), self.rgb[i])
     }
 
     /// Write a sample; returns the time and colour that it replaces.
     #[inline]
     pub(crate) fn replace(&mut self, pixel: u32, time: Time, rgb: [f32; 3]) -> (Time, [f32; 3]) {
-        let i = pixel as usize;
-        let replaced = (self.time[i], self.rgb[i]);
-        self.time[i] = time;
+        let (i, place) = (pixel as usize, self.traced.place(pixel));
+        let replaced = (self.traced.time(self.traced.mark(place)), self.rgb[i]);
+        self.traced.set(place, time);
         self.rgb[i] = rgb;
-        self.known[i] = true;
         replaced
     }
 
@@ -224,8 +235,7 @@ impl Canvas {
             size,
             generation: self.generation.wrapping_add(1),
             rgb: source.iter().map(|&i| self.rgb[i]).collect(),
-            time: source.iter().map(|&i| self.time[i]).collect(),
-            known: source.iter().map(|&i| self.known[i]).collect(),
+            traced: self.traced.resized(size, |pixel| source[pixel as usize] as u32),
             holes: coarse_to_fine(size),
             last_minute: Vec::new(),
             updates: self.updates + 1,
@@ -265,8 +275,8 @@ mod tests {
         let canvas = numbered(7, 5);
         let back = canvas.resized(Size::new(21, 15)).resized(Size::new(7, 5));
         assert_eq!(
-            (back.size(), back.rgb(), back.time()),
-            (canvas.size(), canvas.rgb(), canvas.time())
+            (back.size(), back.rgb(), Vec::from_iter(back.time())),
+            (canvas.size(), canvas.rgb(), Vec::from_iter(canvas.time()))
         );
         assert_eq!((canvas.generation(), back.generation()), (0, 2));
     }
@@ -279,8 +289,10 @@ mod tests {
     #[test]
     fn replacing_returns_what_was_there() {
         let mut canvas = numbered(2, 1);
-        assert_eq!(canvas.replace(1, Time(5), [9.0; 3]), (Time::ZERO, [1.0; 3]));
-        assert_eq!(canvas.replace(1, Time(6), [0.0; 3]), (Time(5), [9.0; 3]));
+        let [tick, later] = [1 << 14, 3 << 14].map(Time);
+        assert_eq!(canvas.replace(1, tick, [9.0; 3]), (Time::ZERO, [1.0; 3]));
+        assert_eq!(canvas.replace(1, Time(later.0 + 99), [0.0; 3]), (tick, [9.0; 3]));
+        assert_eq!(canvas.time_of(1), later, "rounded down");
     }
 
     #[test]

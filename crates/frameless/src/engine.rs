@@ -346,11 +346,11 @@ impl<T: Tracer> Engine<T> {
                 let (x, y) = size.xy(pixel);
                 return Err(EngineError::NotFinite { x, y, scene_secs: answer.scene_secs, rgb });
             }
-            if answer.now < self.canvas.time()[pixel as usize] {
+            if answer.now < self.canvas.time_of(pixel) {
                 self.counters.dropped += 1;
                 continue;
             }
-            let known = self.canvas.known()[pixel as usize];
+            let known = self.canvas.is_known(pixel);
             let is_refinement =
                 request.sample_index > 0 && self.canvas.samples()[pixel as usize] > 0;
             let (previous, old) = match is_refinement {
@@ -375,6 +375,7 @@ impl<T: Tracer> Engine<T> {
         self.findings.refinements.clear();
         self.reconstruction.keep(&kept, &self.display, &mut self.findings);
         self.observations.clear();
+        let now = now.as_kept();
         let refinements = &self.findings.refinements;
         let samples = requests.iter().zip(before).zip(&self.findings.changes).enumerate();
         self.observations.extend(samples.map(|(i, ((request, &(previous, known)), &change))| {
@@ -441,8 +442,8 @@ impl<T: Tracer> Engine<T> {
     /// Gives the reconstruction what the canvas holds, as samples without surfaces, with their times.
     fn hand_over_canvas(&mut self) {
         let canvas = &self.canvas;
-        let held = canvas.time().iter().zip(canvas.known()).zip(0u32..);
-        let held = held.filter(|((_, known), _)| **known).map(|((&time, _), pixel)| (time, pixel));
+        let held = canvas.time().zip(canvas.known()).zip(0u32..);
+        let held = held.filter(|((_, known), _)| *known).map(|((time, _), pixel)| (time, pixel));
         let mut held: Vec<(Time, u32)> = held.collect();
         held.sort_unstable();
         for batch in held.chunk_by(|(a, _), (b, _)| a == b) {

@@ -48,6 +48,7 @@ mod tile_pdf;
 mod time;
 mod timeline;
 mod tone_map;
+mod traced;
 mod tracer;
 mod weights;
 mod wide;

@@ -7,7 +7,7 @@ use crate::{Canvas, Rates, Request, Time, Weights};
 pub struct Observation {
     /// Which pixel was traced.
     pub pixel: u32,
-    /// When it was traced.
+    /// When it was traced, as [`Canvas::time`] has it.
     pub now: Time,
     /// When what the pixel showed had been traced; [`Time::ZERO`] if never.
     pub previous: Time,

@@ -1,6 +1,7 @@
 //! The picture cut into square tiles; those at the right and bottom border may be smaller.
 
 use crate::Size;
+use crate::traced::{Place, TILE_PIXELS};
 
 /// Which pixel lies in which tile. Tiles are numbered row by row.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -73,6 +74,60 @@ impl TileGrid {
         (self.by_side.quotient(y) * self.columns + self.by_side.quotient(x)) as usize
     }
 
+    /// Where a pixel is if tiles are numbered and their pixels, row by row, too. Only for tiles of 8×8.
+    #[inline(always)]
+    pub(crate) fn place(&self, pixel: u32) -> Place {
+        debug_assert_eq!(self.side, 8);
+        let y = self.by_width.quotient(pixel);
+        let x = pixel - y * self.size.width;
+        let tile = (y / 8) as usize * self.columns as usize + (x / 8) as usize;
+        Place(tile * TILE_PIXELS + (y % 8 * 8 + x % 8) as usize)
+    }
+
+    /// The pixel at a place, the inverse of [`TileGrid::place`]. Only for tiles of 8×8.
+    #[inline(always)]
+    pub(crate) fn pixel(&self, place: Place) -> u32 {
+        self.corner(place.tile()) + self.step(place.within())
+    }
+
+    /// The first pixel of a tile of 8×8.
+    #[inline(always)]
+    pub(crate) fn corner(&self, tile: usize) -> u32 {
+        debug_assert_eq!(self.side, 8);
+        let [column, row] = self.column_and_row(tile);
+        8 * (row * self.size.width + column)
+    }
+
+    /// Whether no tile is cut.
+    #[inline(always)]
+    pub(crate) fn is_whole(&self) -> bool {
+        (self.size.width | self.size.height).is_multiple_of(8)
+    }
+
+    #[inline(always)]
+    pub(crate) fn column_and_row(&self, tile: usize) -> [u32; 2] {
+        let row = self.by_columns.quotient(tile as u32);
+        [tile as u32 - row * self.columns, row]
+    }
+
+    /// A bit for every pixel of a tile of 8×8, row by row: set where there is one.
+    #[inline]
+    pub(crate) fn pixels_of(&self, tile: usize) -> u64 {
+        if self.is_whole() {
+            return u64::MAX;
+        }
+        let [x1, y1] = self.column_and_row(tile).map(|at| 8 * (at + 1));
+        let columns = 0xff >> x1.saturating_sub(self.size.width);
+        (columns * 0x0101_0101_0101_0101) & (u64::MAX >> (8 * y1.saturating_sub(self.size.height)))
+    }
+
+    /// From the first pixel of a tile of 8×8 to another one in it.
+    #[inline(always)]
+    pub(crate) fn step(&self, within: usize) -> u32 {
+        let within = within as u32;
+        within / 8 * self.size.width + within % 8
+    }
+
     #[inline]
     pub(crate) fn rect(&self, tile: usize) -> TileRect {
         let row = self.by_columns.quotient(tile as u32);
@@ -99,6 +154,22 @@ mod tests {
             for dividend in multiples.flat_map(near).chain([0, 1, u32::MAX]) {
                 assert_eq!(Divider::new(divisor).quotient(dividend), dividend / divisor);
             }
+        }
+    }
+
+    #[test]
+    fn places_are_those_of_the_tiles() {
+        for (width, height) in [(512, 384), (13, 7), (1, 1), (3, 9)] {
+            let grid = TileGrid::new(Size::new(width, height), 8);
+            for pixel in 0..grid.size.pixels() as u32 {
+                let (place, (x, y)) = (grid.place(pixel), grid.size.xy(pixel));
+                assert_eq!(place.tile(), grid.tile_of(pixel));
+                assert_eq!(place.within() as u32, y % 8 * 8 + x % 8);
+                assert_eq!(grid.pixel(place), pixel);
+                assert!(grid.pixels_of(place.tile()) >> place.within() & 1 == 1);
+            }
+            let pixels = (0..grid.len()).map(|tile| grid.pixels_of(tile).count_ones() as usize);
+            assert_eq!(pixels.sum::<usize>(), grid.size.pixels());
         }
     }
 

@@ -71,8 +71,8 @@ fn check_oldest(kind: ReconstructionKind, rate: f64, least_share: f64) {
     let bound_secs = 1.5 * SIZE.pixels() as f64 / (rate * least_share);
     let mut engine = engine(world(STILL, disc), kind, rate);
     let (_, secs) = play(&mut engine, (1.4 * 60.0 * bound_secs) as u64);
-    let oldest = engine.canvas().time().iter().min().expect("pixels");
-    let age_secs = Time::from_secs(secs).secs_since(*oldest);
+    let oldest = engine.canvas().time().min().expect("pixels");
+    let age_secs = Time::from_secs(secs).secs_since(oldest);
     assert!(age_secs < bound_secs, "{kind:?}: {age_secs} s, at most {bound_secs} s");
 }
 

@@ -20,7 +20,7 @@ use crate::input;
 ///
 /// Rows `sampler.choose_observe_ns` and `sampler.choose_observe_ns_4k`: nanoseconds per sample of choosing and observing of
 /// `adaptive` alone, in a scene with what its changes make of it (holes, fronts, learned rates), and in a picture of 3840×2160
-/// of which a tenth changes.
+/// of which a tenth changes. Row `sampler.growth_256x`: how much more a sample costs in a picture of 2048×1536 than in one of 128×96.
 pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
     let conditions = format!(
         "{}×{}, 938 samples per batch, one thread, {} rounds; a tenth of the picture flickers; \
@@ -35,6 +35,7 @@ pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
     let mut rows: Vec<Row> = SamplerKind::ALL.into_iter().map(row).collect();
     rows.push(in_a_scene(args)?);
     rows.push(in_4k(args));
+    rows.extend(growth(args));
     Ok(rows)
 }
 
@@ -76,6 +77,28 @@ fn in_4k(args: &BenchArgs) -> Row {
         &rounds.collect::<Vec<f64>>(),
         &conditions,
     )
+}
+
+/// Pictures of which one has 256 times the pixels of the other.
+const GROWTH: [Size; 2] = [Size { width: 128, height: 96 }, Size { width: 2048, height: 1536 }];
+
+/// What a sample costs in either picture, and how many times as much in the large one, round by round.
+fn growth(args: &BenchArgs) -> [Row; 3] {
+    let conditions = format!(
+        "938 samples per batch, adaptive+hold, never refreshed, from a known picture; the left tenth changes colour from batch to batch, \
+         whatever its size, which costs nothing to trace; one thread, {} rounds of {} s after half a second",
+        args.rounds, args.secs
+    );
+    let nanos = |size: Size| -> Vec<f64> {
+        (0..args.rounds).map(|seed| flickering_nanos(size, args.secs, u64::from(seed))).collect()
+    };
+    let [small, large] = GROWTH.map(nanos);
+    let growth: Vec<f64> = large.iter().zip(&small).map(|(large, small)| large / small).collect();
+    [
+        Row::new("sampler.choose_observe_ns_128x96", "ns/sample", &small, &conditions),
+        Row::new("sampler.choose_observe_ns_2048x1536", "ns/sample", &large, &conditions),
+        Row::new("sampler.growth_256x", "ratio", &growth, &conditions),
+    ]
 }
 
 /// Samples per second of the sketch: 938 per batch.
@@ -180,7 +203,6 @@ fn scene_nanos(world: &Arc<World>, args: &BenchArgs, seed: u64) -> f64 {
 }
 
 fn nanos_4k(secs: f64, seed: u64) -> f64 {
-    let size = Size::new(3840, 2160);
     let render = |batch: &Batch| -> Vec<[f32; 3]> {
         let turn = (batch.scene_secs * 10.0) as u32;
         let colour = |request: &Request| {
@@ -190,6 +212,25 @@ fn nanos_4k(secs: f64, seed: u64) -> f64 {
         };
         batch.requests.iter().map(|request| [colour(request); 3]).collect()
     };
+    held_nanos(Size::new(3840, 2160), render, secs, seed)
+}
+
+fn flickering_nanos(size: Size, secs: f64, seed: u64) -> f64 {
+    let render = |batch: &Batch| -> Vec<[f32; 3]> {
+        let bright = (batch.id % 2) as f32;
+        let colour = |pixel: u32| if pixel % size.width < size.width / 10 { bright } else { 0.5 };
+        batch.requests.iter().map(|request| [colour(request.pixel); 3]).collect()
+    };
+    held_nanos(size, render, secs, seed)
+}
+
+/// From a known picture, never refreshed.
+fn held_nanos(
+    size: Size,
+    render: impl FnMut(&Batch) -> Vec<[f32; 3]>,
+    secs: f64,
+    seed: u64,
+) -> f64 {
     let canvas = Canvas::from_picture(size, vec![[0.5; 3]; size.pixels()]);
     let (mut engine, nanos) = timed_engine(canvas, Function::new(render), seed);
     let mut run_until = |secs: f64| {

@@ -63,9 +63,9 @@ impl Contender for Blind<'_> {
         self.engine.run_until(time)?;
         self.trace_chosen();
         shown.picture.clone_from(&self.picture);
-        let traced = self.engine.canvas().time().iter();
+        let traced = self.engine.canvas().time();
         shown.age_secs.clear();
-        shown.age_secs.extend(traced.map(|&traced| time.secs_since(traced) as f32));
+        shown.age_secs.extend(traced.map(|traced| time.secs_since(traced) as f32));
         Ok(())
     }
 }

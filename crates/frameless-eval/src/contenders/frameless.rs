@@ -48,9 +48,9 @@ impl Contender for Frameless<'_> {
         self.engine.run_until(time)?;
         shown.picture.clear();
         shown.picture.extend_from_slice(self.engine.refresh(time));
-        let traced = self.engine.canvas().time().iter();
+        let traced = self.engine.canvas().time();
         shown.age_secs.clear();
-        shown.age_secs.extend(traced.map(|&traced| time.secs_since(traced) as f32));
+        shown.age_secs.extend(traced.map(|traced| time.secs_since(traced) as f32));
         Ok(())
     }
 }

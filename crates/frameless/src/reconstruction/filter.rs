@@ -36,7 +36,7 @@ impl Reconstruction for Filter {
         let Some(rates) = refresh.rates else { return };
         tile_contrast(&self.held, &rates.grid, &mut self.contrast);
         self.age_secs.clear();
-        self.age_secs.extend(canvas.time().iter().map(|&time| refresh.now.secs_since(time) as f32));
+        self.age_secs.extend(canvas.time().map(|time| refresh.now.secs_since(time) as f32));
         for tile in 0..rates.grid.len() {
             self.filter_tile(rates, tile, picture);
         }

@@ -149,7 +149,7 @@ impl Sums {
             tile_pixels: (0..grid.len()).map(|t| grid.rect(t).pixels()).collect(),
             grid,
         };
-        for (pixel, time) in canvas.time().iter().enumerate() {
+        for (pixel, time) in canvas.time().enumerate() {
             let tile = sums.grid.tile_of(pixel as u32);
             sums.tile_time[tile] = sums.tile_time[tile].wrapping_add(time.0);
             sums.tile_change[tile] += u64::from(sums.change[pixel]);
@@ -223,7 +223,7 @@ mod tests {
             let (pixel, now) = (rng.below(size.pixels() as u32), Time(i * 1111));
             let (previous, _) = canvas.replace(pixel, now, [0.0; 3]);
             let change = if rng.below(3) == 0 { 3.0 * rng.unit_f32() } else { 0.0 };
-            sums.update(&observation(pixel, now, previous, change));
+            sums.update(&observation(pixel, canvas.time_of(pixel), previous, change));
             d[pixel as usize] = fixed(change);
         }
         assert_eq!(sums, Sums::from_scratch(&canvas, 16, &d));
@@ -237,13 +237,13 @@ mod tests {
         let mut requests = Vec::new();
         sampler.choose(Time(1), &canvas, 500, &mut requests);
         let observe = |request: &Request| {
-            let (previous, _) = canvas.replace(request.pixel, Time(50), [0.5; 3]);
-            observation(request.pixel, Time(50), previous, 0.75)
+            let (previous, _) = canvas.replace(request.pixel, Time(50_000), [0.5; 3]);
+            observation(request.pixel, canvas.time_of(request.pixel), previous, 0.75)
         };
         let observations: Vec<Observation> = requests.iter().map(observe).collect();
         sampler.observe(&canvas, &observations);
         let canvas = canvas.resized(other).resized(size);
-        sampler.choose(Time(100), &canvas, 1, &mut requests);
+        sampler.choose(Time(100_000), &canvas, 1, &mut requests);
         let known = sampler.known.as_ref().expect("made by the choice");
         assert_eq!(known.sums, Sums::from_scratch(&canvas, 8, &[]));
     }
@@ -257,14 +257,14 @@ mod tests {
         let mut d = vec![0.0f64; size.pixels()];
         for i in 0..40u64 {
             let pixel = rng.below(size.pixels() as u32);
-            let (now, change) = (Time(1000 + i), rng.unit_f32());
+            let (now, change) = (Time((100 + i) << 14), rng.unit_f32());
             let (previous, _) = canvas.replace(pixel, now, [0.0; 3]);
             sums.update(&observation(pixel, now, previous, change));
             d[pixel as usize] = f64::from(change);
         }
         // The formulas of the paper, pixel by pixel.
-        let now = Time(2000);
-        let age: Vec<f64> = canvas.time().iter().map(|&t| now.secs_since(t)).collect();
+        let now = Time(200 << 14);
+        let age: Vec<f64> = canvas.time().map(|t| now.secs_since(t)).collect();
         let (d_sum, a_sum): (f64, f64) = (d.iter().sum(), age.iter().sum());
         let w_d = f64::from(w_d);
         let mut want = vec![0.0; 6];
@@ -320,12 +320,12 @@ mod tests {
             + size_of_val(&sums.tile_time[..])
             + size_of_val(&sums.tile_pixels[..])
             + size_of_val(&pdf.probability[..])
-            + size_of_val(canvas.time());
+            + size_of_val(canvas.traced().tiles());
         let per_pixel = bytes as f64 / canvas.size().pixels() as f64;
         assert!(per_pixel <= 32.0, "{per_pixel} bytes per pixel");
         assert!(
-            (12.0..12.2).contains(&per_pixel),
-            "docs/performance.md says 12.1, this is {per_pixel}"
+            (8.0..8.2).contains(&per_pixel),
+            "docs/performance.md says 8.1, this is {per_pixel}"
         );
     }
 }

@@ -3,7 +3,7 @@
 use super::store::SCREEN;
 use super::{AHEAD, Reproject};
 use crate::tile::TileGrid;
-use crate::{Request, Time, wide};
+use crate::{Canvas, Request, Time, wide};
 
 /// Where to look for a surface in a hole: the farthest of these neighbours has probably been uncovered.
 const AROUND: [[i32; 2]; 8] = [[3, 0], [-3, 0], [0, 3], [0, -3], [6, 0], [-6, 0], [0, 6], [0, -6]];
@@ -14,11 +14,10 @@ const FASTEST_PX: f32 = 200.0;
 const UNAIMED_AFTER_SECS: f64 = 0.5;
 
 impl Reproject {
-    /// `shown_since`: when what the pixel shows was traced.
-    pub(super) fn aim_one(&self, now: Time, shown_since: &[Time], request: &mut Request) {
+    pub(super) fn aim_one(&self, now: Time, canvas: &Canvas, request: &mut Request) {
         let size = self.store.layout.size;
         let Some(motion) = self.motion(request.pixel) else { return };
-        let is_old = || now.secs_since(shown_since[request.pixel as usize]) > UNAIMED_AFTER_SECS;
+        let is_old = || now.secs_since(canvas.time_of(request.pixel)) > UNAIMED_AFTER_SECS;
         if motion == [0.0; 2] || is_old() {
             return;
         }

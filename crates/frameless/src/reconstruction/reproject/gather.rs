@@ -15,19 +15,19 @@ use super::fill::{self, AROUND};
 use super::holes::{Hole, Waiting};
 use super::smooth::Smooth;
 use super::store::{EMPTY, Layout, Store, TICK_SECS, Tick, centres, distance2};
+use crate::Time;
 use crate::bands;
 use crate::rates::Rates;
+use crate::tile::TileGrid;
+use crate::traced::{Mark, TileMarks};
 use crate::wide::{self, F8, M8, Planes, Unit};
-use crate::{Size, Time};
 
 /// What became of the pixels.
 pub(super) struct Gather {
     /// Whether pixels show means; else each its own best sample as it is.
     means: bool,
-    /// Per pixel when what it shows was traced; [`Time::ZERO`] if nothing is known anywhere.
-    pub(super) time: Vec<Time>,
-    /// Per pixel whether it has a sample of its own.
-    pub(super) known: Vec<bool>,
+    /// Per pixel when what it shows was traced, [`Time::ZERO`] if nothing is known anywhere, and whether it has a sample of its own.
+    pub(super) marks: Vec<TileMarks>,
     /// Pixels to be traced.
     pub(super) waiting: Waiting,
     /// Per pixel the one whose sample it shows: itself, unless it is a hole.
@@ -53,8 +53,7 @@ impl Gather {
     pub(super) fn new(means: bool) -> Gather {
         Gather {
             means,
-            time: Vec::new(),
-            known: Vec::new(),
+            marks: Vec::new(),
             waiting: Waiting::default(),
             source: Vec::new(),
             far: Vec::new(),
@@ -77,8 +76,7 @@ impl Gather {
     ) {
         let pixels = store.layout.size.pixels();
         picture.resize(pixels, [0.0; 3]);
-        self.time.resize(pixels, Time::ZERO);
-        self.known.resize(pixels, false);
+        self.marks.resize(rates.grid.len(), TileMarks::UNKNOWN);
         self.source.resize(pixels, fill::NOBODY);
         self.far.clear();
         self.waiting.clear();
@@ -97,26 +95,29 @@ impl Gather {
         let band = rows as usize * size.width as usize;
         self.found.resize_with(size.height.div_ceil(rows) as usize, Found::default);
         let means = self.means;
+        // Bands are of whole tiles, but for the last.
+        let tiles = rows.div_ceil(8) as usize * rates.grid.columns as usize;
         let bands = picture
             .chunks_mut(band)
-            .zip(self.known.chunks_mut(band))
-            .zip(self.time.chunks_mut(band))
+            .zip(self.marks.chunks_mut(tiles))
             .zip(self.source.chunks_mut(band))
             .zip(&mut self.found)
             .zip((0..size.height).step_by(rows as usize));
-        let bands = bands.map(|(((((picture, known), time), source), found), first_row)| {
+        let bands = bands.map(|((((picture, marks), source), found), first_row)| {
             let first = size.index(0, first_row);
-            Blocks { model, cells, now, means, first, picture, known, time, source, found }
+            let first_tile = (first_row / 8 * rates.grid.columns) as usize;
+            Blocks { model, cells, means, first, first_tile, picture, marks, source, found }
         });
         bands::run(threads, bands.collect(), wide::run);
         for found in &mut self.found {
             self.waiting.append(&mut found.waiting);
             self.far.append(&mut found.far);
         }
-        self.fill_far(size, shown, picture);
+        self.fill_far(&rates.grid, shown, picture);
     }
 
-    fn fill_far(&mut self, size: Size, shown: &[[f32; 3]], picture: &mut [[f32; 3]]) {
+    fn fill_far(&mut self, grid: &TileGrid, shown: &[[f32; 3]], picture: &mut [[f32; 3]]) {
+        let size = grid.size;
         if self.far.len() == size.pixels() {
             picture.copy_from_slice(shown);
         } else {
@@ -124,9 +125,15 @@ impl Gather {
         }
         fill::nearest(size, &self.far, &mut self.source);
         for &pixel in &self.far {
-            let source = self.source[pixel as usize];
-            let time = if source == fill::NOBODY { Time::ZERO } else { self.time[source as usize] };
-            self.time[pixel as usize] = time;
+            let mark = match self.source[pixel as usize] {
+                fill::NOBODY => Mark::default(),
+                source => {
+                    let place = grid.place(source);
+                    Mark(self.marks[place.tile()].0[place.within()])
+                }
+            };
+            let place = grid.place(pixel);
+            self.marks[place.tile()].0[place.within()] = mark.of_unknown().0;
         }
     }
 
@@ -239,14 +246,13 @@ struct Model<'a> {
 struct Blocks<'a> {
     model: Model<'a>,
     cells: &'a Cells,
-    now: Time,
     means: bool,
-    /// The band's first pixel.
+    /// The band's first pixel, and its first tile.
     first: u32,
+    first_tile: usize,
     /// Of the band's pixels, as all below.
     picture: &'a mut [[f32; 3]],
-    known: &'a mut [bool],
-    time: &'a mut [Time],
+    marks: &'a mut [TileMarks],
     source: &'a mut [u32],
     found: &'a mut Found,
 }
@@ -315,27 +321,32 @@ impl Blocks<'_> {
         let start = size.index(x, y);
         let [r, g, b] = seen.rgb;
         let rgb = [r.lanes(), g.lanes(), b.lanes()];
-        let (ticks, are_holes) = (seen.tick.lanes(), holes.bits());
         let in_band = (start - self.first) as usize;
         let pixels = in_band..in_band + lanes;
         let picture = &mut self.picture[pixels.clone()];
-        let known = &mut self.known[pixels.clone()];
-        let time = &mut self.time[pixels.clone()];
         let source = &mut self.source[pixels];
         for lane in 0..lanes {
             picture[lane] = [rgb[0][lane], rgb[1][lane], rgb[2][lane]];
-            known[lane] = are_holes & (1 << lane) == 0;
-            time[lane] = Tick(ticks[lane]).time(self.now);
             source[lane] = start + lane as u32;
         }
+        // A mask is −1 where it is set.
+        let marks = seen.tick.plus(seen.tick).minus(holes);
+        let tile = tile - self.first_tile;
+        marks.store(&mut self.marks[tile].0, (y % 8 * 8) as usize);
         if holes.any() {
-            self.note_holes(&eight, holes, x, y);
+            self.note_holes(&eight, holes, [x, y], tile);
         }
     }
 
     /// How well holes can be guessed, and whose sample they show.
     #[inline(always)]
-    fn note_holes<U: Unit>(&mut self, eight: &Eight<U>, holes: M8<U>, x: u32, y: u32) {
+    fn note_holes<U: Unit>(
+        &mut self,
+        eight: &Eight<U>,
+        holes: M8<U>,
+        [x, y]: [u32; 2],
+        tile: usize,
+    ) {
         let Model { store, .. } = self.model;
         let size = store.layout.size;
         let (mut nearest, mut known) = (M8::<U>::splat(AROUND.len() as u32), M8::splat(0));
@@ -347,6 +358,7 @@ impl Blocks<'_> {
             known = known.plus(is_known);
         }
         let (nearest, known) = (nearest.lanes(), known.lanes());
+        let row = (y % 8 * 8) as usize;
         holes.for_each(|lane| {
             let x = x + lane as u32;
             let pixel = size.index(x, y);
@@ -361,7 +373,8 @@ impl Blocks<'_> {
             let (x, y) = (x.wrapping_add_signed(*dx), y.wrapping_add_signed(*dy));
             self.source[in_band] = size.index(x, y);
             if let Some(i) = store.newest(x, y) {
-                self.time[in_band] = Tick(store.tick[i]).time(self.now);
+                let mark = Mark::of_tick(store.tick[i]).of_unknown();
+                self.marks[tile].0[row + lane] = mark.0;
             }
         });
     }

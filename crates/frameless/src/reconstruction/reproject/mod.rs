@@ -216,7 +216,7 @@ impl Reconstruction for Reproject {
             for i in 0..requests.len() {
                 self.prefetch_motion(requests, i);
                 if requests[i].sample_index == 0 {
-                    self.aim_one(now, canvas.time(), &mut requests[i]);
+                    self.aim_one(now, canvas, &mut requests[i]);
                 }
             }
         }
@@ -344,9 +344,9 @@ impl Reproject {
     fn tell(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas) {
         self.shadows.find_edges(&self.store, self.relight.moved(), &mut self.edges);
         canvas.set_last_minute(&mut self.edges);
-        let gather::Gather { waiting, time, known, .. } = &mut self.gather;
+        let gather::Gather { waiting, marks, .. } = &mut self.gather;
         waiting.order(&mut self.holes);
-        canvas.update(refresh.now, &mut self.holes, time, known);
+        canvas.update(refresh.now, &mut self.holes, marks);
         canvas.set_samples(self.samples_wanted(refresh), self.settled.counts());
         let grid = refresh.rates.filter(|_| refresh.wants_motion).map(|rates| &rates.grid);
         let motion = grid.into_iter().flat_map(|grid| self.tile_motion(grid));

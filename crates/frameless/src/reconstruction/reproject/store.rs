@@ -8,8 +8,10 @@
 //! stays where it is. Every cell has one, also while it is empty.
 
 use super::packed::{PackedAlbedo, PackedNormal};
+use crate::time::TICK_BITS;
+pub(super) use crate::time::{TICK_SECS, Tick};
 use crate::wide::{self, F8, M8, Unit};
-use crate::{Display, Kept, Size, Surface, Time};
+use crate::{Display, Kept, Size, Surface};
 
 /// The object number of samples of which the renderer could not say what they hit: they stay where they are in the picture.
 pub(super) const SCREEN: u32 = Surface::SKY - 1;
@@ -63,32 +65,8 @@ pub(super) struct Sample {
     pub(super) shade: Shade,
 }
 
-/// A time in units of 2¹⁴ ns (16 µs), modulo 2³² of them (19 hours).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Tick(pub(super) u32);
-
-const TICK_BITS: u32 = 14;
-pub(super) const TICK_SECS: f32 = (1u64 << TICK_BITS) as f32 * 1e-9;
-
 /// Half a second.
 const VERY_OLD_TICKS: u32 = 500_000_000 >> TICK_BITS;
-
-impl Tick {
-    pub(super) fn of(time: Time) -> Tick {
-        Tick((time.0 >> TICK_BITS) as u32)
-    }
-
-    /// The time, rounded down, of a tick that is not later than `now`.
-    pub(super) fn time(self, now: Time) -> Time {
-        let ago = u64::from(Tick::of(now).0.wrapping_sub(self.0));
-        Time(((now.0 >> TICK_BITS) - ago) << TICK_BITS)
-    }
-
-    #[inline(always)]
-    pub(super) fn is_later_than(self, other: Tick) -> bool {
-        self.0.wrapping_sub(other.0) as i32 > 0
-    }
-}
 
 impl Shade {
     // Inlined: what is written to memory in small parts and read in large ones at once has to wait for all that was written before.

@@ -1,17 +1,14 @@
-//! A block of tiles, of which one is drawn at a time: in proportion to their shares, without chance.
+//! A block of tiles that gets draws together: what it has got is shared out among its tiles, without chance.
 //!
 //! ```text
-//! c_i ← c_i + n · q_i / Σ q       for every tile of the block, before n draws
-//! n times:   the tile whose c is largest is drawn, c ← c − 1
+//! c_i ← c_i + n · q_i / Σ q,   q_i = a · w_i + b · e_i      for every tile of the block, when it has got n draws
+//! while c_i ≥ 1:   c_i ← c_i − 1, and tile i is drawn
 //! ```
-//!
-//! That is the weighted round robin with which servers are balanced; Σ c stays as it is.
+
+use crate::wide::{F8, Unit};
 
 /// Tiles in a block; 16 numbers are a line of the cache.
 pub(super) const BLOCK: usize = 16;
-/// Added to credits before they are compared, so that they are above 0. While all tiles of a block have shares none is below −1; where
-/// they have them by turns it may be a little less.
-const ABOVE_ZERO: f32 = 8.0;
 
 /// Consecutive tiles; of the last block some may not be there, and have no share.
 #[derive(Clone, Copy, Default)]
@@ -31,90 +28,81 @@ impl Block {
         (sum(&self.weight), sum(&self.even))
     }
 
-    /// Calls `take` with the tiles that are drawn; nobody if none has a share.
-    #[inline]
-    pub(super) fn draw(&mut self, a: f32, b: f32, draws: u32, mut take: impl FnMut(usize)) {
+    /// Calls `take` with the tiles that are drawn, when the block has got `got` draws; nobody if none has a share.
+    #[inline(always)]
+    pub(super) fn draw<U: Unit>(&mut self, a: f32, b: f32, got: f32, mut take: impl FnMut(usize)) {
+        let (a, b) = (F8::<U>::splat(a), F8::splat(b));
         let mut q = [0.0; BLOCK];
-        for (q, (weight, even)) in q.iter_mut().zip(self.weight.iter().zip(&self.even)) {
-            *q = a * weight + b * even;
+        for half in [0, BLOCK / 2] {
+            let eight = a * F8::load(&self.weight, half) + b * F8::load(&self.even, half);
+            q[half..half + BLOCK / 2].copy_from_slice(&eight.lanes());
         }
-        let part = draws as f32 / sum(&q).max(f32::MIN_POSITIVE);
-        let mut compared = [0.0; BLOCK];
-        for ((compared, credit), q) in compared.iter_mut().zip(&mut self.credit).zip(&q) {
-            *credit += q * part;
-            // Who has no share stays at 0.
-            *compared = f32::from(u8::from(*q > 0.0)) * (*credit + ABOVE_ZERO);
+        let shares = sum(&q);
+        if shares <= 0.0 {
+            return;
         }
-        for _ in 0..draws {
-            let tile = largest(&compared);
-            if compared[tile] > 0.0 {
-                self.credit[tile] -= 1.0;
-                compared[tile] -= 1.0;
-                take(tile);
-            }
+        let part = F8::<U>::splat(got / shares);
+        let mut ripe = 0;
+        for half in [0, BLOCK / 2] {
+            let credit = F8::load(&self.credit, half) + part * F8::load(&q, half);
+            self.credit[half..half + BLOCK / 2].copy_from_slice(&credit.lanes());
+            ripe |= (!credit.less_than(F8::splat(1.0)).bits() & 255) << half;
+        }
+        while ripe != 0 {
+            let tile = ripe.trailing_zeros() as usize;
+            ripe &= ripe - 1;
+            let draws = self.credit[tile] as u32;
+            self.credit[tile] -= draws as f32;
+            (0..draws).for_each(|_| take(tile));
         }
     }
 }
 
 /// In pairs, which a processor adds side by side.
-#[inline]
+#[inline(always)]
 fn sum(numbers: &[f32; BLOCK]) -> f32 {
     let mut fours = [0.0; 4];
     for numbers in numbers.as_chunks::<4>().0 {
-        fours.iter_mut().zip(numbers).for_each(|(sum, number)| *sum += number);
-    }
-    (fours[0] + fours[2]) + (fours[1] + fours[3])
-}
-
-/// Where the largest of some numbers is that are not negative, to four bits less than they have.
-///
-/// Positive floats are in the order of their bits, so the place is written into the lowest of these and the largest carries it along:
-/// no branch that depends on the numbers.
-#[inline]
-fn largest(numbers: &[f32; BLOCK]) -> usize {
-    const PLACE: u32 = BLOCK as u32 - 1;
-    let mut numbered = [0.0; BLOCK];
-    for (i, (numbered, number)) in (0..).zip(numbered.iter_mut().zip(numbers)) {
-        *numbered = f32::from_bits(number.to_bits() & !PLACE | i);
-    }
-    let mut fours = [0.0f32; 4];
-    for numbered in numbered.as_chunks::<4>().0 {
-        for (four, &number) in fours.iter_mut().zip(numbered) {
-            *four = if number > *four { number } else { *four };
+        for (sum, number) in fours.iter_mut().zip(numbers) {
+            *sum += number;
         }
     }
-    let largest = fours.into_iter().fold(0.0, |a, b| if b > a { b } else { a });
-    (largest.to_bits() & PLACE) as usize
+    (fours[0] + fours[2]) + (fours[1] + fours[3])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Rng;
+    use crate::wide::{self, Task};
 
-    #[test]
-    fn the_largest_is_found_wherever_it_is() {
-        let mut rng = Rng::new(13);
-        for place in 0..BLOCK {
-            let mut numbers: [f32; BLOCK] = std::array::from_fn(|_| 8.0 * rng.unit_f32());
-            numbers[place] = 9.0;
-            assert_eq!(largest(&numbers), place);
+    /// What one block draws by turns.
+    struct Turns<'a>(&'a mut Block, f32, &'a mut Vec<usize>);
+
+    impl Task for Turns<'_> {
+        #[inline(always)]
+        fn run<U: Unit>(self) {
+            let Turns(block, got, drawn) = self;
+            block.draw::<U>(2.0, 0.25, got, |tile| drawn.push(tile));
         }
     }
 
     #[test]
-    fn shares_by_turns_do_not_let_credits_sink_to_nothing() {
-        let mut block = Block { weight: [1.0; BLOCK], ..Block::default() };
-        for turn in 0..10_000 {
-            let has = |i: usize| i % 7 == turn % 7 || i == turn % 16;
-            block.weight = std::array::from_fn(|i| if has(i) { 1.0 } else { 0.0 });
-            let mut drawn = 0;
-            block.draw(1.0, 0.0, 3, |tile| {
-                assert!(has(tile));
-                drawn += 1;
-            });
-            assert_eq!(drawn, 3);
-        }
-        assert!(block.credit.iter().all(|credit| credit.abs() < 0.5 * ABOVE_ZERO));
+    fn a_block_is_known_by_thought() {
+        // q = 2, 0.75 and 0.25 of 3.
+        let mut block = Block::default();
+        [block.weight[0], block.weight[3]] = [1.0, 0.25];
+        [block.even[3], block.even[9]] = [1.0, 1.0];
+        block.credit[9] = 0.75;
+        let mut draw = |got: f32| {
+            let mut drawn = Vec::new();
+            wide::run(Turns(&mut block, got, &mut drawn));
+            drawn
+        };
+        assert_eq!(draw(1.5), [0], "1, 0.375 and 0.875");
+        assert_eq!(draw(3.0), [0, 0, 3, 9], "2, 0.375 + 0.75 and 0.875 + 0.25");
+        assert_eq!(draw(0.0), []);
+        block = Block::default();
+        wide::run(Turns(&mut block, 5.0, &mut Vec::new()));
+        assert_eq!(block.credit, [0.0; BLOCK], "nobody has a share");
     }
 }

@@ -15,7 +15,8 @@ use super::AdaptiveStage;
 use super::order::{self, Order};
 use super::shares::Shares;
 use crate::rates::Rates;
-use crate::{Canvas, Rng, Time, wide};
+use crate::traced::{Mark, Place};
+use crate::{Canvas, Rng, Time};
 
 /// ε: the part of the samples that is spread evenly over the picture, so that every pixel has a floor frequency.
 const EVENLY: f32 = 0.2;
@@ -29,8 +30,8 @@ pub(crate) struct Credit {
     /// Whether all tiles have the same share.
     evenly: bool,
     tiles: Vec<u32>,
-    /// The first pixel of each, and its age.
-    first: Vec<(u32, u64)>,
+    /// The first pixel of each.
+    first: Vec<Place>,
 }
 
 /// m √v.
@@ -40,14 +41,9 @@ fn weight(m: f32, rate: f32) -> f32 {
 }
 
 impl Credit {
-    pub(crate) fn new(
-        tiles: usize,
-        side_bits: u32,
-        without: Option<AdaptiveStage>,
-        rng: &mut Rng,
-    ) -> Credit {
+    pub(crate) fn new(tiles: usize, without: Option<AdaptiveStage>, rng: &mut Rng) -> Credit {
         let shares = Shares::new(tiles, rng);
-        let mut order = Order::new(tiles, side_bits, rng);
+        let mut order = Order::new(tiles, rng);
         if without == Some(AdaptiveStage::Bayer) {
             order.forget(Rng::new(u64::from(rng.next_u32())));
         }
@@ -94,28 +90,24 @@ impl Credit {
         canvas: &Canvas,
         rates: &Rates,
         [count, least_even]: [f32; 2],
-        mut take: impl FnMut(u32),
+        mut take: impl FnMut(Place),
     ) {
         let (a, b) = self.scale(count, least_even);
         self.tiles.clear();
         self.shares.draw(a, b, &mut self.tiles);
-        // What is looked at lies all over the picture. In loops so short many places are fetched at once.
-        for &tile in &self.tiles {
-            self.order.prefetch(tile as usize);
-            rates.prefetch(tile as usize);
-        }
+        // What is looked at lies all over the picture. In a loop so short many places are fetched at once.
+        let traced = canvas.traced();
         self.first.clear();
         for &tile in &self.tiles {
-            let pixel = self.order.next(&rates.grid, tile as usize);
-            wide::prefetch(canvas.known(), pixel as usize);
-            wide::prefetch(canvas.time(), pixel as usize);
-            self.first.push((pixel, 0));
+            rates.prefetch(tile as usize);
+            let place = self.order.next(&rates.grid, tile as usize);
+            traced.prefetch(place);
+            self.first.push(place);
         }
-        for (pixel, age_nanos) in &mut self.first {
-            *age_nanos = order::age_nanos(now, canvas, *pixel);
-        }
-        for (&tile, &first) in self.tiles.iter().zip(&self.first) {
-            take(self.order.old_enough(now, canvas, rates, (tile as usize, first)));
+        let now = Mark::at(now);
+        for &first in &self.first {
+            let (age, enough) = (traced.mark(first).age(now), order::enough(rates, first.tile()));
+            take(self.order.old_enough(now, traced, enough, (first, age)));
         }
     }
 }

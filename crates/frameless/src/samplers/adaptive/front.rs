@@ -1,49 +1,48 @@
 //! Front propagation: where a sample found a change, its neighbours have probably changed too.
+//!
+//! Tiles that have such neighbours wait, first come first served, and hold a bit for each: for those that had not been traced for a
+//! while when the change was found, and have not been since.
 
 use std::collections::VecDeque;
 
-use crate::{Canvas, Observation, Size, Time, wide};
+use crate::tile::TileGrid;
+use crate::traced::{Mark, Place, TILE_PIXELS, Traced, half_ticks};
+use crate::wide::{self, M8, Task, Unit};
+use crate::{Canvas, Observation, Time};
 
 /// A sample that differs by more than this (mean squared difference per channel) is part of a front: 5 % of the range.
 const FRONT_CHANGE: f32 = 0.0025;
 /// Neighbours traced later than a time before the front was found are left alone; its bounds.
-const FRESH_NANOS: [f32; 2] = [1e6, 12e6];
+const FRESH_SECS: [f32; 2] = [1e-3, 12e-3];
 /// How fast that adapts: this part of itself per second.
 const ADAPT_PER_SEC: f64 = 29.0;
 /// The most by which it is multiplied or divided at once, however long a batch takes.
 const MOST_AT_ONCE: f64 = 2.0;
 
-/// How many pixels ahead of the one looked at the next is fetched.
-const AHEAD: usize = 8;
+/// How many tiles ahead of the one looked at the next is fetched.
+const AHEAD: usize = 4;
 
-/// Pixels beside changes, first come first served.
+/// Pixels beside changes, tile by tile.
 pub(crate) struct Front {
-    queue: VecDeque<(u32, Time)>,
-    queued: Bits,
-    capacity: usize,
+    waiting: VecDeque<u32>,
+    tiles: Vec<TileFront>,
     /// Neighbours younger than this are left alone.
-    fresh_nanos: f32,
+    fresh_secs: f32,
     /// When that was adapted last.
     adapted: Time,
     // Of the observations at hand.
-    changed: Vec<Observation>,
-    stale: Vec<u32>,
+    changed: Vec<(Place, Mark)>,
 }
 
-/// One bit per pixel: of a large picture bytes would be more than the nearer caches hold.
-struct Bits(Vec<u8>);
-
-impl Bits {
-    #[inline]
-    fn of(&self, pixel: u32) -> bool {
-        self.0[pixel as usize / 8] >> (pixel % 8) & 1 != 0
-    }
-
-    #[inline]
-    fn set(&mut self, pixel: u32, value: bool) {
-        let (eight, bit) = (&mut self.0[pixel as usize / 8], pixel % 8);
-        *eight = *eight & !(1 << bit) | u8::from(value) << bit;
-    }
+/// A bit per pixel of a tile.
+#[derive(Clone, Copy, Default)]
+struct TileFront {
+    /// Those beside changes.
+    beside: u64,
+    /// Those to be looked at again however young they are.
+    suspect: u64,
+    /// Whether the tile is in the queue.
+    waits: bool,
 }
 
 /// Whether what was known there is wrong now.
@@ -52,49 +51,55 @@ pub(super) fn is_part(observed: &Observation) -> bool {
     observed.known && observed.change > 3.0 * FRONT_CHANGE
 }
 
-/// Bit 3 (j + 1) + i + 1: the neighbour i columns to the right and j rows below has not been traced for a while.
-#[inline]
-fn stale_around(observed: &Observation, canvas: &Canvas, fresh: u64) -> u32 {
-    let size = canvas.size();
-    let (x, y) = size.xy(observed.pixel);
-    let is_inside = x > 0 && y > 0 && x + 1 < size.width && y + 1 < size.height;
-    let mut stale = 0;
-    for j in 0..3 {
-        if is_inside {
-            let begin = size.index(x - 1, y + j - 1) as usize;
-            for (i, &time) in (0..).zip(&canvas.time()[begin..begin + 3]) {
-                stale |= u32::from(age_nanos(observed.now, time) >= fresh) << (3 * j + i);
-            }
-            continue;
-        }
-        for i in (0..3).filter(|i| (1..=size.width).contains(&(x + i))) {
-            if (1..=size.height).contains(&(y + j)) {
-                let time = canvas.time()[size.index(x + i - 1, y + j - 1) as usize];
-                stale |= u32::from(age_nanos(observed.now, time) >= fresh) << (3 * j + i);
-            }
-        }
-    }
-    stale & !(1 << 4)
+/// The neighbours of a pixel of a tile.
+#[derive(Clone, Copy)]
+struct Beside {
+    /// In the tile itself.
+    own: u64,
+    /// In the tile to the left or right, above or below, and in the one at the corner; those to which [`Beside::step`] leads.
+    others: [u64; 3],
+    /// To the other tiles: columns, rows.
+    step: [i32; 2],
 }
 
-#[inline]
-fn age_nanos(now: Time, time: Time) -> u64 {
-    now.0.saturating_sub(time.0)
-}
+const BESIDE: [Beside; TILE_PIXELS] = {
+    let mut all = [Beside { own: 0, others: [0; 3], step: [0; 2] }; TILE_PIXELS];
+    let mut within = 0;
+    while within < TILE_PIXELS {
+        let (x, y) = (within as i32 % 8, within as i32 / 8);
+        let mut i = 0;
+        while i < 9 {
+            let (nx, ny) = (x + i % 3 - 1, y + i / 3 - 1);
+            let bit = if i == 4 { 0 } else { 1 << (ny.rem_euclid(8) * 8 + nx.rem_euclid(8)) };
+            let (dx, dy) = (nx.div_euclid(8), ny.div_euclid(8));
+            let beside = &mut all[within];
+            if dx != 0 {
+                beside.step[0] = dx;
+            }
+            if dy != 0 {
+                beside.step[1] = dy;
+            }
+            match (dx != 0, dy != 0) {
+                (false, false) => beside.own |= bit,
+                (true, false) => beside.others[0] |= bit,
+                (false, true) => beside.others[1] |= bit,
+                (true, true) => beside.others[2] |= bit,
+            }
+            i += 1;
+        }
+        within += 1;
+    }
+    all
+};
 
 impl Front {
-    pub(crate) fn new(size: Size) -> Front {
-        let capacity = (size.pixels() / 8).max(4096);
-        let queued = Bits(vec![0; size.pixels().div_ceil(8)]);
-        let (changed, stale) = (Vec::new(), Vec::new());
+    pub(crate) fn new(tiles: usize) -> Front {
         Front {
-            queue: VecDeque::new(),
-            queued,
-            capacity,
-            changed,
-            stale,
-            fresh_nanos: FRESH_NANOS[1],
+            waiting: VecDeque::new(),
+            tiles: vec![TileFront::default(); tiles],
+            fresh_secs: FRESH_SECS[1],
             adapted: Time::ZERO,
+            changed: Vec::new(),
         }
     }
 
@@ -104,88 +109,162 @@ impl Front {
         let secs = now.secs_since(std::mem::replace(&mut self.adapted, now));
         let growth = (1.0 + ADAPT_PER_SEC * secs).min(MOST_AT_ONCE) as f32;
         let factor = if all_followed { 1.0 / growth } else { growth };
-        self.fresh_nanos = (self.fresh_nanos * factor).clamp(FRESH_NANOS[0], FRESH_NANOS[1]);
+        self.fresh_secs = (self.fresh_secs * factor).clamp(FRESH_SECS[0], FRESH_SECS[1]);
     }
 
-    /// Queue the neighbours of samples that are part of a front, but of late looks.
+    /// The neighbours of samples that are part of a front wait from now on, but of late looks. `places` are those of the observations.
     pub(crate) fn observe(
         &mut self,
         observations: &[Observation],
+        places: &[Place],
         canvas: &Canvas,
-        is_late: impl Fn(u32) -> bool,
+        is_late: impl Fn(Place) -> bool,
     ) {
+        // In a list of their own, so that nobody has to guess who is part of a front.
         let mut changed = std::mem::take(&mut self.changed);
-        changed.clear();
-        changed.extend(
-            observations.iter().filter(|observed| is_part(observed) && !is_late(observed.pixel)),
-        );
-        for observed in &changed {
-            let (pixel, width) = (observed.pixel as usize, canvas.size().width as usize);
-            for pixel in [pixel.saturating_sub(width), pixel, pixel + width] {
-                wide::prefetch(&self.queued.0, pixel / 8);
-                wide::prefetch(canvas.time(), pixel);
-            }
+        changed.resize(observations.len(), Default::default());
+        let mut parts = 0;
+        for (observed, &place) in observations.iter().zip(places) {
+            changed[parts] = (place, Mark::at(observed.now));
+            parts += usize::from(is_part(observed) & !is_late(place));
         }
-        // Looking lies apart from queueing, without a branch that depends on what is seen, so that many pixels are fetched at once.
-        let mut stale = std::mem::take(&mut self.stale);
-        stale.clear();
-        let fresh = self.fresh_nanos as u64;
-        stale.extend(changed.iter().map(|observed| stale_around(observed, canvas, fresh)));
-        for (observed, &stale) in changed.iter().zip(&stale) {
-            self.queue_around(observed, stale, canvas.size());
-        }
-        (self.changed, self.stale) = (changed, stale);
+        let (traced, fresh) = (canvas.traced(), half_ticks(self.fresh_secs));
+        wide::run(QueueBeside { front: self, traced, fresh, changed: &changed[..parts] });
+        self.changed = changed;
     }
 
-    fn queue_around(&mut self, observed: &Observation, mut stale: u32, size: Size) {
-        while stale != 0 && self.queue.len() < self.capacity {
-            let i = stale.trailing_zeros();
-            stale &= stale - 1;
-            // Bit 0 is one row up and one column to the left: a step back, which wraps.
-            let step = (i / 3 * size.width + i % 3).wrapping_sub(size.width + 1);
-            let pixel = observed.pixel.wrapping_add(step);
-            if !self.queued.of(pixel) {
-                self.queued.set(pixel, true);
-                self.queue.push_back((pixel, observed.now));
-            }
+    /// A pixel has just been traced.
+    #[inline]
+    pub(crate) fn traced(&mut self, place: Place) {
+        self.tiles[place.tile()].beside &= !(1 << place.within());
+    }
+
+    /// Begin to fetch what is known of a tile.
+    #[inline]
+    pub(crate) fn prefetch(&self, tile: usize) {
+        wide::prefetch(&self.tiles, tile);
+    }
+
+    #[inline]
+    fn wait(&mut self, tile: usize) {
+        if !std::mem::replace(&mut self.tiles[tile].waits, true) {
+            self.waiting.push_back(tile as u32);
         }
     }
 
-    /// Queue a pixel that had better be looked at again.
-    pub(crate) fn suspect(&mut self, observed: &Observation) {
-        if self.queue.len() < self.capacity && !self.queued.of(observed.pixel) {
-            self.queued.set(observed.pixel, true);
-            self.queue.push_back((observed.pixel, Time(u64::MAX)));
-        }
+    /// A pixel that had better be looked at again.
+    pub(crate) fn suspect(&mut self, place: Place) {
+        self.tiles[place.tile()].suspect |= 1 << place.within();
+        self.wait(place.tile());
     }
 
-    /// Of how many nanoseconds neighbours are left alone now.
+    /// Of how many seconds neighbours are left alone now.
     #[cfg(test)]
-    pub(crate) fn fresh_nanos(&self) -> f32 {
-        self.fresh_nanos
+    pub(crate) fn fresh_secs(&self) -> f32 {
+        self.fresh_secs
     }
 
-    /// The next pixel that has not been traced since it was queued.
-    pub(crate) fn next(&mut self, canvas: &Canvas) -> Option<u32> {
-        while let Some((pixel, found)) = self.queue.pop_front() {
-            if let Some(&(later, _)) = self.queue.get(AHEAD) {
-                wide::prefetch(canvas.time(), later as usize);
-                wide::prefetch(canvas.known(), later as usize);
-                wide::prefetch(&self.queued.0, later as usize / 8);
+    /// Calls `take` with one tile after another and the pixels of it that are to be looked at; it returns those for which it has no room.
+    /// Whether nobody has to wait.
+    pub(crate) fn follow(
+        &mut self,
+        grid: &TileGrid,
+        mut take: impl FnMut(usize, u64) -> u64,
+    ) -> bool {
+        while let Some(&tile) = self.waiting.front() {
+            if let Some(&later) = self.waiting.get(AHEAD) {
+                self.prefetch(later as usize);
             }
-            self.queued.set(pixel, false);
-            let traced = canvas.time()[pixel as usize];
-            if age_nanos(found, traced) > self.fresh_nanos as u64 || !canvas.known()[pixel as usize]
-            {
-                return Some(pixel);
+            let tile = tile as usize;
+            let TileFront { beside, suspect, .. } = self.tiles[tile];
+            let pixels = (beside | suspect) & grid.pixels_of(tile);
+            let left = if pixels == 0 { 0 } else { take(tile, pixels) };
+            if left != 0 {
+                let (beside, suspect) = (beside & left, suspect & left);
+                self.tiles[tile] = TileFront { beside, suspect, waits: true };
+                return false;
             }
+            self.tiles[tile] = TileFront::default();
+            self.waiting.pop_front();
         }
-        None
+        true
     }
 
     pub(crate) fn clear(&mut self) {
-        for (pixel, _) in self.queue.drain(..) {
-            self.queued.set(pixel, false);
+        for tile in self.waiting.drain(..) {
+            self.tiles[tile as usize] = TileFront::default();
+        }
+    }
+}
+
+/// Queues what is beside pixels that have changed.
+struct QueueBeside<'a> {
+    front: &'a mut Front,
+    traced: &'a Traced,
+    /// In half ticks.
+    fresh: i32,
+    /// Where, and when that was found.
+    changed: &'a [(Place, Mark)],
+}
+
+impl Task for QueueBeside<'_> {
+    #[inline(always)]
+    fn run<U: Unit>(mut self) {
+        for (i, &(place, found)) in self.changed.iter().enumerate() {
+            if let Some(&(later, _)) = self.changed.get(i + AHEAD) {
+                self.traced.prefetch(later);
+            }
+            let Beside { own, others, step } = &BESIDE[place.within()];
+            self.queue::<U>(place.tile(), *own, found);
+            if *step != [0; 2] {
+                self.queue_others::<U>(place.tile(), others, *step, found);
+            }
+        }
+    }
+}
+
+impl QueueBeside<'_> {
+    /// Of some `pixels` of a tile, at least one, those that were traced `fresh` before a change was `found`, or earlier.
+    #[inline(always)]
+    fn queue<U: Unit>(&mut self, tile: usize, pixels: u64, found: Mark) {
+        let marks = &self.traced.tiles()[tile].0;
+        let (first, last) = (pixels.trailing_zeros() / 8, (63 - pixels.leading_zeros()) / 8);
+        let latest = M8::<U>::splat(found.0.wrapping_sub(self.fresh as u32));
+        let mut young = 0;
+        for row in first..=last {
+            let since = latest.minus(M8::load(marks, 8 * row as usize));
+            young |= u64::from(since.less_than(M8::splat(0)).bits() & 255) << (8 * row);
+        }
+        let stale = pixels & !young;
+        if stale != 0 {
+            self.front.tiles[tile].beside |= stale;
+            self.front.wait(tile);
+        }
+    }
+
+    /// The same in the tiles to which `step` leads, as far as there are such.
+    #[inline(always)]
+    fn queue_others<U: Unit>(
+        &mut self,
+        tile: usize,
+        [beside, beyond, corner]: &[u64; 3],
+        [dx, dy]: [i32; 2],
+        found: Mark,
+    ) {
+        let grid = self.traced.grid();
+        let [column, row] = grid.column_and_row(tile);
+        let (across, down) = (column.wrapping_add_signed(dx), row.wrapping_add_signed(dy));
+        let has_across = dx != 0 && across < grid.columns;
+        let has_down = dy != 0 && down < grid.rows;
+        let tile_at = |column: u32, row: u32| (row * grid.columns + column) as usize;
+        if has_across {
+            self.queue::<U>(tile_at(across, row), *beside, found);
+        }
+        if has_down {
+            self.queue::<U>(tile_at(column, down), *beyond, found);
+        }
+        if has_across && has_down {
+            self.queue::<U>(tile_at(across, down), *corner, found);
         }
     }
 }
@@ -193,21 +272,43 @@ impl Front {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Size;
 
     fn found(pixel: u32, now: Time, change: f32) -> Observation {
         Observation { pixel, now, previous: Time::ZERO, known: true, change, refinement: None }
+    }
+
+    fn observe(front: &mut Front, canvas: &Canvas, observed: Observation) {
+        let place = canvas.traced().place(observed.pixel);
+        front.observe(&[observed], &[place], canvas, |_| false);
+    }
+
+    /// All pixels that are to be looked at, in the order of the picture.
+    fn followed(front: &mut Front, canvas: &Canvas) -> Vec<u32> {
+        let mut pixels = Vec::new();
+        let take = |tile: usize, bits: u64| {
+            let places = (0..64).filter(|i| bits >> i & 1 == 1).map(|i| Place(64 * tile + i));
+            pixels.extend(places.map(|place| canvas.traced().grid().pixel(place)));
+            0
+        };
+        assert!(front.follow(canvas.traced().grid(), take));
+        pixels.sort_unstable();
+        pixels
     }
 
     #[test]
     fn the_neighbours_of_a_change_are_next_unless_they_are_fresh() {
         let size = Size::new(4, 3);
         let mut canvas = Canvas::from_picture(size, vec![[0.0; 3]; 12]);
-        let mut front = Front::new(size);
+        let mut front = Front::new(1);
         let now = Time::from_secs(1.0);
         canvas.replace(1, Time::from_secs(0.995), [0.0; 3]);
-        front.observe(&[found(0, now, 0.1)], &canvas, |_| false);
-        let queued: Vec<u32> = std::iter::from_fn(|| front.next(&canvas)).collect();
-        assert_eq!(queued, [4, 5], "1 is 5 ms old, and the corner has no other");
+        observe(&mut front, &canvas, found(0, now, 0.1));
+        assert_eq!(
+            followed(&mut front, &canvas),
+            [4, 5],
+            "1 is 5 ms old, and the corner has no other"
+        );
         assert!(is_part(&found(0, now, 0.1)));
         assert!(!is_part(&found(0, now, 0.001)), "too small a change");
         let unknown = Observation { known: false, ..found(0, now, 0.1) };
@@ -217,46 +318,51 @@ mod tests {
     #[test]
     fn who_was_traced_since_is_left_out() {
         let size = Size::new(3, 1);
-        let mut canvas = Canvas::from_picture(size, vec![[0.0; 3]; 3]);
-        let mut front = Front::new(size);
-        front.observe(&[found(1, Time::from_secs(1.0), 0.1)], &canvas, |_| false);
-        canvas.replace(0, Time::from_secs(1.0), [0.0; 3]);
-        assert_eq!((front.next(&canvas), front.next(&canvas)), (Some(2), None));
+        let canvas = Canvas::from_picture(size, vec![[0.0; 3]; 3]);
+        let mut front = Front::new(1);
+        observe(&mut front, &canvas, found(1, Time::from_secs(1.0), 0.1));
+        front.traced(canvas.traced().place(0));
+        assert_eq!(followed(&mut front, &canvas), [2]);
     }
 
     #[test]
     fn every_pixel_has_the_neighbours_that_it_has() {
-        let (size, now) = (Size::new(4, 3), Time::from_secs(1.0));
-        let canvas = Canvas::from_picture(size, vec![[0.0; 3]; 12]);
-        for pixel in 0..12 {
-            let mut front = Front::new(size);
-            front.observe(&[found(pixel, now, 0.1)], &canvas, |_| false);
-            let queued: Vec<u32> = std::iter::from_fn(|| front.next(&canvas)).collect();
-            let near = |other: &u32| {
-                let ((x, y), (u, v)) = (size.xy(pixel), size.xy(*other));
-                *other != pixel && x.abs_diff(u) < 2 && y.abs_diff(v) < 2
-            };
-            assert_eq!(queued, (0..12).filter(near).collect::<Vec<u32>>(), "pixel {pixel}");
+        let now = Time::from_secs(1.0);
+        for size in
+            [(4, 3), (19, 17), (8, 16), (1, 9)].map(|(width, height)| Size::new(width, height))
+        {
+            let canvas = Canvas::from_picture(size, vec![[0.0; 3]; size.pixels()]);
+            for pixel in 0..size.pixels() as u32 {
+                let mut front = Front::new(canvas.traced().grid().len());
+                observe(&mut front, &canvas, found(pixel, now, 0.1));
+                let near = |other: &u32| {
+                    let ((x, y), (u, v)) = (size.xy(pixel), size.xy(*other));
+                    *other != pixel && x.abs_diff(u) < 2 && y.abs_diff(v) < 2
+                };
+                let near: Vec<u32> = (0..size.pixels() as u32).filter(near).collect();
+                assert_eq!(followed(&mut front, &canvas), near, "pixel {pixel} of {size:?}");
+            }
         }
     }
 
     #[test]
     fn late_looks_begin_no_fronts() {
         let canvas = Canvas::from_picture(Size::new(3, 1), vec![[0.0; 3]; 3]);
-        let mut front = Front::new(canvas.size());
-        front.observe(&[found(1, Time::from_secs(1.0), 0.1)], &canvas, |pixel| pixel == 1);
-        assert_eq!(front.next(&canvas), None);
+        let (mut front, grid) = (Front::new(1), canvas.traced().grid());
+        let observed = found(1, Time::from_secs(1.0), 0.1);
+        front.observe(&[observed], &[grid.place(1)], &canvas, |place| place == grid.place(1));
+        assert!(followed(&mut front, &canvas).is_empty());
     }
 
     #[test]
     fn where_all_fronts_are_followed_younger_neighbours_are_looked_at_again() {
         let mut canvas = Canvas::from_picture(Size::new(3, 1), vec![[0.0; 3]; 3]);
-        let mut front = Front::new(canvas.size());
+        let mut front = Front::new(1);
         let now = Time::from_secs(1.0);
         (0..3).for_each(|pixel| _ = canvas.replace(pixel, Time::from_secs(0.995), [0.0; 3]));
         let next = |front: &mut Front| {
-            front.observe(&[found(1, now, 0.1)], &canvas, |_| false);
-            std::iter::from_fn(|| front.next(&canvas)).count()
+            observe(front, &canvas, found(1, now, 0.1));
+            followed(front, &canvas).len()
         };
         assert_eq!(next(&mut front), 0, "5 ms are young at first");
         let millis = |millis: u64| Time(millis * 1_000_000);
@@ -264,5 +370,28 @@ mod tests {
         assert_eq!(next(&mut front), 2);
         (101..201).for_each(|time| front.adapt(millis(time), false));
         assert_eq!(next(&mut front), 0, "and again where fronts have to wait");
+    }
+
+    #[test]
+    fn who_has_no_room_waits_in_front_and_suspects_are_looked_at_in_any_case() {
+        let size = Size::new(16, 8);
+        let canvas = Canvas::from_picture(size, vec![[0.0; 3]; size.pixels()]);
+        let (mut front, now) = (Front::new(2), Time::from_secs(1.0));
+        observe(&mut front, &canvas, found(2, now, 0.1));
+        front.suspect(canvas.traced().grid().place(2));
+        observe(&mut front, &canvas, found(12, now, 0.1));
+        // Traced just now: only as a suspect is it looked at.
+        front.traced(canvas.traced().place(2));
+        let mut seen = Vec::new();
+        let all = front.follow(canvas.traced().grid(), |tile, pixels| {
+            seen.push((tile, pixels));
+            pixels & !0b10
+        });
+        assert!(!all && seen == [(0, 0b1110_0000_1110)], "{seen:?}");
+        front.traced(canvas.traced().place(3));
+        assert_eq!(followed(&mut front, &canvas), [2, 11, 13, 17, 18, 19, 27, 28, 29]);
+        observe(&mut front, &canvas, found(12, now, 0.1));
+        front.clear();
+        assert_eq!(followed(&mut front, &canvas), [0u32; 0]);
     }
 }

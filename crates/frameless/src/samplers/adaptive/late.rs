@@ -51,11 +51,11 @@ impl Late {
         if most == 0 || !self.is_time(now, canvas.last_minute().len().div_ceil(most), batch_secs) {
             return;
         }
-        let begun = *self.begun.get_or_insert(now);
+        let begun = *self.begun.get_or_insert(now.as_kept());
         while most > 0 {
             let Some(&pixel) = canvas.last_minute().get(self.next) else { return };
             self.next += 1;
-            if canvas.time()[pixel as usize] < begun {
+            if canvas.time_of(pixel) < begun {
                 take(pixel);
                 most -= 1;
             }
@@ -84,8 +84,7 @@ mod tests {
         let mut late = Late::new();
         for refresh in 0..3 {
             let now = Time(refresh * 16 * MILLISECOND);
-            let (mut time, mut known) = (canvas.time().to_vec(), canvas.known().to_vec());
-            canvas.update(now, &mut Vec::new(), &mut time, &mut known);
+            canvas.update(now, &mut Vec::new(), &mut canvas.traced().tiles().to_vec());
             late.look(&canvas);
         }
         canvas.set_last_minute(&mut (0..pixels).collect());

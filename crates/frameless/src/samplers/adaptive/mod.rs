@@ -21,7 +21,6 @@ mod order;
 mod refine;
 mod shares;
 mod stage;
-mod turns;
 mod weights;
 mod why;
 
@@ -29,7 +28,8 @@ use std::collections::VecDeque;
 
 use crate::rates::Rates;
 use crate::tile::TileGrid;
-use crate::{Canvas, Insight, Observation, Refinement, Request, Rng, Sampler, Time, Weights, wide};
+use crate::traced::Place;
+use crate::{Canvas, Insight, Observation, Refinement, Request, Rng, Sampler, Time, Weights};
 use credit::Credit;
 use front::Front;
 use late::Late;
@@ -87,7 +87,7 @@ struct State {
     /// Why each pixel was asked for last.
     why: Reasons,
     /// Of the observations at hand.
-    tiles: Vec<u32>,
+    places: Vec<Place>,
 }
 
 impl Adaptive {
@@ -113,11 +113,12 @@ impl State {
         let grid = TileGrid::new(canvas.size(), 1 << TILE_BITS);
         let mut state = State {
             generation: canvas.generation(),
-            credit: Credit::new(grid.len(), TILE_BITS, without, rng),
-            refine: Refine::new(&grid, TILE_BITS, rng),
+            credit: Credit::new(grid.len(), without, rng),
+            refine: Refine::new(&grid, rng),
             weights: TileWeights::new(weights, &grid),
+            front: Front::new(grid.len()),
+            why: Reasons::new(grid.len()),
             rates: Rates::new(grid),
-            front: Front::new(canvas.size()),
             late: Late::new(),
             front_share: FRONT_SHARE,
             hot: 0,
@@ -125,8 +126,7 @@ impl State {
             next_hole: 0,
             later_holes: VecDeque::new(),
             owed: 0.0,
-            why: Reasons::new(canvas.size()),
-            tiles: Vec::new(),
+            places: Vec::new(),
         };
         state.weigh_all();
         state
@@ -151,7 +151,7 @@ impl State {
     }
 
     fn take(&mut self, pixel: u32, why: Why, requests: &mut Vec<Request>) {
-        self.why.set(pixel, why);
+        self.why.set(self.rates.grid.place(pixel), why);
         requests.push(Request::centre(pixel));
     }
 
@@ -161,8 +161,7 @@ impl State {
             let Some(&pixel) = canvas.holes().get(self.next_hole) else { break };
             self.next_hole += 1;
             if let Some(&later) = canvas.holes().get(self.next_hole + AHEAD) {
-                wide::prefetch(canvas.known(), later as usize);
-                wide::prefetch(canvas.time(), later as usize);
+                canvas.traced().prefetch(self.rates.grid.place(later));
             }
             if canvas.still_waits(pixel) {
                 match self.weights.lets_pass(&self.rates.grid, pixel) {
@@ -182,7 +181,6 @@ impl State {
     fn choose_fronts(
         &mut self,
         now: Time,
-        canvas: &Canvas,
         rest: usize,
         temporal: f32,
         requests: &mut Vec<Request>,
@@ -195,13 +193,23 @@ impl State {
             return;
         }
         let end = requests.len() + (self.front_share * rest as f32) as usize;
-        while requests.len() < end {
-            let Some(pixel) = self.front.next(canvas) else { return self.front.adapt(now, true) };
-            if self.weights.lets_pass(&self.rates.grid, pixel) {
-                self.take(pixel, Why::Front, requests);
+        let State { front, weights, rates, why, .. } = self;
+        let grid = &rates.grid;
+        let all_followed = front.follow(grid, |tile, mut pixels| {
+            let (corner, mut taken) = (grid.corner(tile), 0);
+            while pixels != 0 && requests.len() < end {
+                let bit = pixels & pixels.wrapping_neg();
+                pixels ^= bit;
+                let pixel = corner + grid.step(bit.trailing_zeros() as usize);
+                if weights.lets_pass(grid, pixel) {
+                    taken |= bit;
+                    requests.push(Request::centre(pixel));
+                }
             }
-        }
-        self.front.adapt(now, false);
+            why.set_all(tile, taken, Why::Front);
+            pixels
+        });
+        front.adapt(now, all_followed);
     }
 
     fn choose_late(
@@ -216,7 +224,7 @@ impl State {
         let State { late, weights, rates, why, .. } = self;
         late.choose(now, canvas, rest, wanted, |pixel| {
             if weights.lets_pass(&rates.grid, pixel) {
-                why.set(pixel, Why::Late);
+                why.set(rates.grid.place(pixel), Why::Late);
                 requests.push(Request::centre(pixel));
             }
         });
@@ -230,40 +238,38 @@ fn wanted(temporal: f32) -> f32 {
 
 /// Learning.
 impl State {
-    /// Begin to fetch what an observation will change; returns its tile.
+    /// Begin to fetch what an observation will change; returns where it is.
     #[inline]
-    fn fetch(&self, observed: &Observation) -> u32 {
-        let tile = self.rates.grid.tile_of(observed.pixel);
+    fn fetch(&self, observed: &Observation) -> Place {
+        let place = self.rates.grid.place(observed.pixel);
+        let tile = place.tile();
         if observed.refinement.is_some() {
             self.refine.prefetch(tile);
-            return tile as u32;
+            return place;
         }
-        self.why.prefetch(observed.pixel);
+        self.why.prefetch(tile);
+        self.front.prefetch(tile);
         self.rates.prefetch(tile);
         self.credit.prefetch(tile);
-        tile as u32
+        place
     }
 
-    fn observe_refinement(
-        &mut self,
-        observed: &Observation,
-        tile: usize,
-        n: u16,
-        refinement: &Refinement,
-    ) {
+    fn observe_refinement(&mut self, place: Place, n: u16, refinement: &Refinement) {
+        let tile = place.tile();
         self.refine.observe(tile, n, refinement, self.weights.of_tile(tile));
         if refinement.suspect {
-            self.front.suspect(observed);
+            self.front.suspect(place);
         }
     }
 
     #[inline]
-    fn observe_change(&mut self, observed: &Observation, tile: usize) {
-        let weight = match self.why.of(observed.pixel) {
+    fn observe_change(&mut self, observed: &Observation, place: Place) {
+        let weight = match self.why.of(place) {
             Why::Tile => 1.0,
             Why::Front => 0.5,
             Why::Hole | Why::Late => return,
         };
+        let tile = place.tile();
         let (before, after) = self.rates.observe(tile, observed, weight);
         self.credit.weigh(tile, self.weights.of_tile(tile), after);
         self.hot += usize::from(after > HOT_RATE);
@@ -290,7 +296,7 @@ impl Sampler for Adaptive {
         }
         if without != Some(AdaptiveStage::Fronts) {
             let rest = count - (requests.len() - start);
-            state.choose_fronts(now, canvas, rest, self.temporal, requests);
+            state.choose_fronts(now, rest, self.temporal, requests);
         }
         if without != Some(AdaptiveStage::Late) {
             let rest = count - (requests.len() - start);
@@ -304,9 +310,9 @@ impl Sampler for Adaptive {
         }
         let before = requests.len();
         let rest = count as f32 - (before - start) as f32;
-        credit.draw(now, canvas, rates, [rest + *owed, LEAST_EVEN * left], |pixel| {
-            why.set(pixel, Why::Tile);
-            requests.push(Request::centre(pixel));
+        credit.draw(now, canvas, rates, [rest + *owed, LEAST_EVEN * left], |place| {
+            why.set(place, Why::Tile);
+            requests.push(Request::centre(rates.grid.pixel(place)));
         });
         *owed += rest - (requests.len() - before) as f32;
     }
@@ -317,24 +323,28 @@ impl Sampler for Adaptive {
             return;
         };
         // First what will be changed is fetched, all over the picture, then it is changed.
-        let mut tiles = std::mem::take(&mut state.tiles);
-        tiles.clear();
-        tiles.extend(observations.iter().map(|observed| state.fetch(observed)));
-        for (observed, &tile) in observations.iter().zip(&tiles) {
+        let mut places = std::mem::take(&mut state.places);
+        places.clear();
+        places.extend(observations.iter().map(|observed| state.fetch(observed)));
+        for (observed, &place) in observations.iter().zip(&places) {
             match &observed.refinement {
                 Some(refinement) => {
                     let n = canvas.samples()[observed.pixel as usize];
-                    state.observe_refinement(observed, tile as usize, n, refinement);
+                    state.observe_refinement(place, n, refinement);
                 }
-                None if observed.known => state.observe_change(observed, tile as usize),
-                None => {}
+                None => {
+                    state.front.traced(place);
+                    if observed.known {
+                        state.observe_change(observed, place);
+                    }
+                }
             }
         }
-        state.tiles = tiles;
         if state.front_share > 0.0 {
-            let why = &state.why;
-            state.front.observe(observations, canvas, |pixel| why.of(pixel) == Why::Late);
+            let State { front, why, .. } = state;
+            front.observe(observations, &places, canvas, |place| why.of(place) == Why::Late);
         }
+        state.places = places;
     }
 
     fn set_temporal(&mut self, temporal: f32) {
@@ -394,7 +404,7 @@ mod tests {
         let canvas = Canvas::from_picture(size, vec![[0.0; 3]; size.pixels()]);
         assert_eq!(
             choose(&mut Adaptive::new(DEFAULT_TEMPORAL, 1), &canvas, 4),
-            [645, 1986, 1638, 2459]
+            [774, 1541, 1874, 1760, 2267]
         );
     }
 
@@ -557,7 +567,7 @@ mod tests {
         let mut sampler = Adaptive::new(DEFAULT_TEMPORAL, 1);
         play(&mut sampler, |pixel| pixel == 2080, 0.5);
         let state = sampler.state.as_ref().expect("chosen");
-        assert!(state.front.fresh_nanos() < 2e6, "{}", state.front.fresh_nanos());
+        assert!(state.front.fresh_secs() < 2e-3, "{}", state.front.fresh_secs());
         assert_eq!(state.front_share, FRONT_SHARE);
         let mut sampler = Adaptive::new(DEFAULT_TEMPORAL, 1);
         play(&mut sampler, |_| true, 0.5);
@@ -574,14 +584,14 @@ mod tests {
             for millis in 0..48u64 {
                 let now = Time(millis * 1_000_000);
                 if millis % 16 == 0 {
-                    let (mut time, mut known) = (canvas.time().to_vec(), canvas.known().to_vec());
-                    canvas.update(now, &mut Vec::new(), &mut time, &mut known);
+                    canvas.update(now, &mut Vec::new(), &mut canvas.traced().tiles().to_vec());
                     canvas.set_last_minute(&mut (0..200).collect());
                 }
                 sampler.choose(now, &canvas, 100, &mut requests);
             }
             let why = &sampler.state.as_ref().expect("chosen").why;
-            (0..200).filter(|&pixel| why.of(pixel) == Why::Late).count()
+            let grid = canvas.traced().grid();
+            (0..200).filter(|&pixel| why.of(grid.place(pixel)) == Why::Late).count()
         };
         assert!(late(DEFAULT_TEMPORAL) > 150, "{}", late(DEFAULT_TEMPORAL));
         assert_eq!(late(0.0), 0);

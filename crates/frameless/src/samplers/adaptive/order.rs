@@ -2,25 +2,30 @@
 
 use crate::rates::Rates;
 use crate::tile::TileGrid;
-use crate::{Canvas, Rng, Time, bayer, wide};
+use crate::traced::{Mark, Place, TILE_PIXELS, Traced, half_ticks};
+use crate::{Rng, bayer};
 
 /// Pixels looked at before one is taken that is younger than half the mean age of its tile.
 const TRIES: u32 = 4;
 
 /// Places in the order, per tile.
 pub(crate) struct Order {
-    /// Pixels of a tile in their order, relative to its corner; as many as a power of two.
-    order: Vec<(u32, u32)>,
+    /// Pixels of a tile in their order, numbered row by row.
+    order: [u8; TILE_PIXELS],
     place: Vec<u8>,
     /// Draws places instead of the order, if that is left out.
     random: Option<Rng>,
 }
 
 impl Order {
-    /// Tiles have sides of 2^`side_bits`, at most 16 pixels; each begins somewhere else.
-    pub(crate) fn new(tiles: usize, side_bits: u32, rng: &mut Rng) -> Order {
+    /// Tiles are of 8×8 pixels; each begins somewhere else.
+    pub(crate) fn new(tiles: usize, rng: &mut Rng) -> Order {
         let place = (0..tiles).map(|_| rng.next_u32() as u8).collect();
-        Order { order: bayer::order(side_bits), place, random: None }
+        let mut order = [0; TILE_PIXELS];
+        for (within, (dx, dy)) in order.iter_mut().zip(bayer::order(3)) {
+            *within = (8 * dy + dx) as u8;
+        }
+        Order { order, place, random: None }
     }
 
     /// Pixels are drawn at random from now on.
@@ -28,82 +33,77 @@ impl Order {
         self.random = Some(rng);
     }
 
-    /// Begin to fetch the place of a tile.
-    #[inline]
-    pub(crate) fn prefetch(&self, tile: usize) {
-        wide::prefetch(&self.place, tile);
+    #[inline(always)]
+    fn within(&self, tile: usize) -> usize {
+        usize::from(self.order[usize::from(self.place[tile]) % TILE_PIXELS])
     }
 
-    /// The next pixel of a tile, but one near it where the border cuts the tile.
+    /// The next pixel of a tile, but another one near it where the border cuts the tile.
     #[inline]
     pub(crate) fn peek(&self, grid: &TileGrid, tile: usize) -> u32 {
-        let rect = grid.rect(tile);
-        let (dx, dy) = self.order[usize::from(self.place[tile]) & (self.order.len() - 1)];
-        grid.size.index((rect.x0 + dx).min(rect.x1 - 1), (rect.y0 + dy).min(rect.y1 - 1))
+        let last = grid.size.pixels() as u32 - 1;
+        grid.pixel(Place(TILE_PIXELS * tile + self.within(tile))).min(last)
     }
 
     /// The next pixel of a tile, whatever it is.
     #[inline]
-    pub(crate) fn next(&mut self, grid: &TileGrid, tile: usize) -> u32 {
-        let rect = grid.rect(tile);
-        let place = &mut self.place[tile];
+    pub(crate) fn next(&mut self, grid: &TileGrid, tile: usize) -> Place {
         loop {
-            let (dx, dy) = self.order[usize::from(*place) & (self.order.len() - 1)];
+            let within = self.within(tile);
+            let place = &mut self.place[tile];
             *place = match &mut self.random {
                 Some(rng) => rng.next_u32() as u8,
                 None => place.wrapping_add(1),
             };
-            let (x, y) = (rect.x0 + dx, rect.y0 + dy);
-            if x < rect.x1 && y < rect.y1 {
-                return grid.size.index(x, y);
+            if grid.is_whole() || grid.pixels_of(tile) >> within & 1 == 1 {
+                return Place(TILE_PIXELS * tile + within);
             }
         }
     }
 
-    /// The first, given with its age, or one of those after it: the first that is old enough, else the oldest.
+    /// The first, given with its age, or one of those after it: the first that is old enough, else the oldest. Ages are in half ticks.
     #[inline]
     pub(crate) fn old_enough(
         &mut self,
-        now: Time,
-        canvas: &Canvas,
-        rates: &Rates,
-        (tile, first): (usize, (u32, u64)),
-    ) -> u32 {
-        let enough_nanos = (0.5e9 * rates.mean_age_secs(tile)) as u64;
-        let (mut oldest, mut oldest_nanos) = first;
+        now: Mark,
+        traced: &Traced,
+        enough: i32,
+        (first, age): (Place, i32),
+    ) -> Place {
+        let (mut oldest, mut oldest_age) = (first, age);
         for _ in 1..TRIES {
-            if oldest_nanos > enough_nanos {
+            if oldest_age > enough {
                 break;
             }
-            let pixel = self.next(&rates.grid, tile);
-            let age_nanos = age_nanos(now, canvas, pixel);
-            if age_nanos > oldest_nanos {
-                (oldest, oldest_nanos) = (pixel, age_nanos);
+            let place = self.next(traced.grid(), first.tile());
+            let age = traced.mark(place).age(now);
+            if age > oldest_age {
+                (oldest, oldest_age) = (place, age);
             }
         }
         oldest
     }
 }
 
-/// Those of which nothing is known are the oldest. Looks at both in any case, without a branch to be guessed wrong.
+/// The age from which on pixels of a tile are old enough, in half ticks: half their mean age.
 #[inline]
-pub(super) fn age_nanos(now: Time, canvas: &Canvas, pixel: u32) -> u64 {
-    let unknown = u64::from(!canvas.known()[pixel as usize]);
-    now.0.saturating_sub(canvas.time()[pixel as usize].0) | unknown.wrapping_neg()
+pub(super) fn enough(rates: &Rates, tile: usize) -> i32 {
+    half_ticks(0.5 * rates.mean_age_secs(tile))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Size;
+    use crate::{Canvas, Size, Time};
 
     #[test]
     fn every_pixel_of_a_cut_tile_has_its_turn() {
         let grid = TileGrid::new(Size::new(13, 11), 8);
-        let mut order = Order::new(grid.len(), 3, &mut Rng::new(1));
+        let mut order = Order::new(grid.len(), &mut Rng::new(1));
         for tile in 0..grid.len() {
             let pixels = grid.rect(tile).pixels() as usize;
-            let turns: Vec<u32> = (0..2 * pixels).map(|_| order.next(&grid, tile)).collect();
+            let turns = (0..2 * pixels).map(|_| grid.pixel(order.next(&grid, tile)));
+            let turns: Vec<u32> = turns.collect();
             let mut once = turns[..pixels].to_vec();
             once.sort_unstable();
             once.dedup();
@@ -123,12 +123,14 @@ mod tests {
             let observed = crate::Observation { pixel, now, previous, known, change, refinement };
             rates.observe(0, &observed, 1.0);
         }
-        let mut order = Order::new(1, 3, &mut Rng::new(1));
-        let turns: Vec<u32> = (0..64).map(|_| order.next(&grid, 0)).collect();
+        let mut order = Order::new(1, &mut Rng::new(1));
+        let turns: Vec<u32> = (0..64).map(|_| grid.pixel(order.next(&grid, 0))).collect();
         let mut canvas = Canvas::from_picture(size, vec![[0.0; 3]; 64]);
         let mut chosen = |canvas: &Canvas| {
-            let first = order.next(&grid, 0);
-            order.old_enough(now, canvas, &rates, (0, (first, age_nanos(now, canvas, first))))
+            let (first, now) = (order.next(&grid, 0), Mark::at(now));
+            let age = canvas.traced().mark(first).age(now);
+            let place = order.old_enough(now, canvas.traced(), enough(&rates, 0), (first, age));
+            grid.pixel(place)
         };
         canvas.replace(turns[0], Time::from_secs(0.9), [0.0; 3]);
         assert_eq!(chosen(&canvas), turns[1], "the first is younger than half a second");

@@ -170,7 +170,7 @@ impl Unfinished {
 }
 
 impl Refine {
-    pub(crate) fn new(grid: &TileGrid, side_bits: u32, rng: &mut Rng) -> Refine {
+    pub(crate) fn new(grid: &TileGrid, rng: &mut Rng) -> Refine {
         let tiles = grid.len();
         let unknown =
             TileNoise { variance: FIRST_VARIANCE, samples: FIRST_SAMPLES, unfinished: 0.0 };
@@ -179,7 +179,7 @@ impl Refine {
             behind: Behind::Alike,
             variance_sum: f64::from(FIRST_VARIANCE) * tiles as f64,
             shares: Shares::new(tiles, rng),
-            order: Order::new(tiles, side_bits, rng),
+            order: Order::new(tiles, rng),
             index: vec![0; grid.size.pixels()],
             spatial_error: 0.0,
             temporal_error: 0.0,
@@ -312,7 +312,7 @@ impl Refine {
             Behind::First => fewest(canvas, &rect)?,
         };
         for _ in 0..rect.pixels() {
-            let pixel = self.order.next(grid, tile);
+            let pixel = grid.pixel(self.order.next(grid, tile));
             let n = canvas.samples()[pixel as usize];
             if n > 0 && n <= most {
                 let index = &mut self.index[pixel as usize];
@@ -343,7 +343,7 @@ mod tests {
     #[test]
     fn a_part_of_the_samples_always_looks_for_change() {
         let grid = TileGrid::new(Size::new(16, 16), 8);
-        let mut refine = Refine::new(&grid, 3, &mut Rng::new(1));
+        let mut refine = Refine::new(&grid, &mut Rng::new(1));
         assert_eq!(refine.temporal_part(0.0), 1.0, "nothing to refine");
         (refine.spatial_error, refine.temporal_error) = (1.0, 1e-9);
         assert_eq!(refine.temporal_part(0.5), LEAST_TEMPORAL);

@@ -1,6 +1,7 @@
-//! Why each pixel was asked for last, four pixels to a byte: of a large picture even that is more than the nearer caches hold.
+//! Why each pixel was asked for last: two bits, those of a tile beside each other.
 
-use crate::{Size, wide};
+use crate::traced::Place;
+use crate::wide;
 
 /// Who wanted it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,18 +12,19 @@ pub(super) enum Why {
     Late = 3,
 }
 
-/// One of every pixel.
-pub(super) struct Reasons(Vec<u8>);
+/// One of every pixel: of each tile the lower bits of its 64 pixels, and the upper ones.
+pub(super) struct Reasons(Vec<[u64; 2]>);
 
 impl Reasons {
     /// All for their tiles.
-    pub(super) fn new(size: Size) -> Reasons {
-        Reasons(vec![0; size.pixels().div_ceil(4)])
+    pub(super) fn new(tiles: usize) -> Reasons {
+        Reasons(vec![[0; 2]; tiles])
     }
 
     #[inline]
-    pub(super) fn of(&self, pixel: u32) -> Why {
-        match self.0[pixel as usize / 4] >> (pixel % 4 * 2) & 3 {
+    pub(super) fn of(&self, place: Place) -> Why {
+        let [low, high] = self.0[place.tile()].map(|bits| bits >> place.within() & 1);
+        match low | high << 1 {
             0 => Why::Tile,
             1 => Why::Front,
             2 => Why::Hole,
@@ -31,15 +33,23 @@ impl Reasons {
     }
 
     #[inline]
-    pub(super) fn set(&mut self, pixel: u32, why: Why) {
-        let (four, shift) = (&mut self.0[pixel as usize / 4], pixel % 4 * 2);
-        *four = *four & !(3 << shift) | (why as u8) << shift;
+    pub(super) fn set(&mut self, place: Place, why: Why) {
+        self.set_all(place.tile(), 1 << place.within(), why);
     }
 
-    /// Begin to fetch that of a pixel.
+    /// Of all pixels of a tile whose bits are set.
     #[inline]
-    pub(super) fn prefetch(&self, pixel: u32) {
-        wide::prefetch(&self.0, pixel as usize / 4);
+    pub(super) fn set_all(&mut self, tile: usize, pixels: u64, why: Why) {
+        let (low, high) = ((why as u64 & 1).wrapping_neg(), (why as u64 >> 1).wrapping_neg());
+        let [lower, upper] = &mut self.0[tile];
+        *lower = *lower & !pixels | low & pixels;
+        *upper = *upper & !pixels | high & pixels;
+    }
+
+    /// Begin to fetch those of a tile.
+    #[inline]
+    pub(super) fn prefetch(&self, tile: usize) {
+        wide::prefetch(&self.0, tile);
     }
 }
 
@@ -49,12 +59,15 @@ mod tests {
 
     #[test]
     fn neighbours_keep_their_own() {
-        let mut reasons = Reasons::new(Size::new(5, 1));
-        let all = [Why::Hole, Why::Front, Why::Tile, Why::Hole, Why::Front];
+        let mut reasons = Reasons::new(2);
+        let all = [Why::Hole, Why::Front, Why::Tile, Why::Late, Why::Front];
         for turn in 0..3 {
-            let why = |pixel: u32| all[(pixel as usize + turn) % 5];
-            (0..5).for_each(|pixel| reasons.set(pixel, why(pixel)));
-            assert!((0..5).all(|pixel| reasons.of(pixel) == why(pixel)), "turn {turn}");
+            let why = |place: usize| all[(place + turn) % 5];
+            (0..128).for_each(|place| reasons.set(Place(place), why(place)));
+            assert!((0..128).all(|place| reasons.of(Place(place)) == why(place)), "turn {turn}");
         }
+        reasons.set_all(1, 0b101, Why::Late);
+        let after = [64, 65, 66].map(|place| reasons.of(Place(place)));
+        assert_eq!(after, [Why::Late, all[67 % 5], Why::Late]);
     }
 }
