@@ -154,7 +154,9 @@ pub(crate) struct RenderArgs {
 /// Trace one pixel and tell every step: the ray, what it hit, each light, the colour
 #[derive(ClapArgs)]
 #[command(after_help = "Example:
-  frameless trace sphere --pixel 256,192 --time 0.5")]
+  frameless trace sphere --pixel 256,192 --time 0.5
+  frameless trace model.glb --pixel 256,192 --integrator path --sample 7
+      one path, surface by surface")]
 pub(crate) struct TraceArgs {
     /// A glTF file or a built-in scene
     pub(crate) scene: String,
@@ -178,6 +180,13 @@ pub(crate) struct TraceArgs {
     /// Which of the scene's cameras, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) camera: u32,
+
+    /// Which sample of the pixel's sequence, counted from 0 [default: none of them but its centre, with the numbers of sample 0]
+    #[arg(long, value_name = "N")]
+    pub(crate) sample: Option<u32>,
+
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
 }
 
 /// Tell what is in a scene: shapes, materials, textures, cameras, lights, motion, and what was ignored

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use anyhow::anyhow;
 use frameless::Request;
-use frameless_trace::{Settings, ViewSource, World};
+use frameless_trace::{ViewSource, World};
 
 use crate::args::TraceArgs;
 use crate::failure::Failure;
 use crate::{input, output};
 
-/// Trace the pixel's centre and tell.
+/// Trace the pixel's centre, or a sample of its sequence, and tell.
 pub(crate) fn run(args: &TraceArgs) -> Result<(), Failure> {
     let (x, y) = args.pixel;
     let size = args.size;
@@ -24,8 +24,11 @@ pub(crate) fn run(args: &TraceArgs) -> Result<(), Failure> {
     let (scene, _) = input::lit_scene(&args.scene, &args.open)?;
     let view = ViewSource::Camera(input::camera(&scene, args.camera)?);
     let world = World::new(Arc::new(scene));
-    let request = Request::centre(size.index(x, y));
-    let steps =
-        frameless_trace::explain(&world, args.time, &view, size, &request, &Settings::default());
+    let (pixel, settings) = (size.index(x, y), args.light.settings()?);
+    let request = match args.sample {
+        None => Request::centre(pixel),
+        Some(number) => Request::in_sequence(pixel, number),
+    };
+    let steps = frameless_trace::explain(&world, args.time, &view, size, &request, &settings);
     Ok(output::print(&(steps.join("\n") + "\n"))?)
 }

@@ -169,10 +169,14 @@ impl Shared {
         samples.resize(order.len(), ([0.0; 3], Surface::default()));
         let chunks = order.par_chunks(CHUNK).zip(samples.par_chunks_mut(CHUNK));
         chunks.for_each_init(Stack::new, |stack, (order, samples)| {
-            for (&request, sample) in order.iter().zip(samples) {
-                let request = &requests[request as usize];
-                *sample = self.world.sample(moment, camera, request, settings, stack);
-            }
+            let (seen, mut places) = ((&*moment, camera), samples.iter_mut());
+            let requests = order.iter().map(|&request| requests[request as usize]);
+            let put = |rgb, surface| {
+                if let Some(place) = places.next() {
+                    *place = (rgb, surface);
+                }
+            };
+            self.world.samples(seen, requests, settings, stack, put);
         });
     }
 

@@ -75,6 +75,7 @@ struct Picture {
 
 impl World {
     /// What comes back along a ray.
+    #[inline(always)]
     pub(crate) fn radiance(
         &self,
         moment: &Moment,
@@ -112,8 +113,8 @@ impl World {
         let (ray, depth) = (leg.ray, leg.depth);
         probe.note(|| format!("ray {depth}: from {:.5} along {:.5}", ray.origin, ray.direction));
         let found = match leg.culls {
-            false => self.nearest(moment, &ray, Chance::Never, stack),
-            true => self.behind_back(moment, &ray, Chance::Never, stack),
+            false => self.nearest(moment, &ray, || Chance::Never, stack),
+            true => self.behind_back(moment, &ray, || Chance::Never, stack),
         };
         let Some(hit) = found else {
             self.see_sky(leg, picture, probe);
@@ -344,9 +345,11 @@ fn reflect(direction: Vec3A, point: &Point) -> Vec3A {
 }
 
 /// Radiance as promised: what is not a number becomes black, what is beyond all reason so bright that sums of it are still numbers.
+#[inline(always)]
 pub(crate) fn finite(radiance: Vec3A) -> [f32; 3] {
     const BRIGHTEST: f32 = 1e30;
-    radiance.to_array().map(|c| if c.is_nan() { 0.0 } else { c.clamp(0.0, BRIGHTEST) })
+    // Of a number and one that is none the maximum is the number.
+    radiance.max(Vec3A::ZERO).min(Vec3A::splat(BRIGHTEST)).to_array()
 }
 
 /// Whether the material reflects and does nothing else, wherever on it.

@@ -28,12 +28,16 @@ pub fn explain(
     let view = view.at(world.scene(), moment.state());
     let (x, y) = size.xy(request.pixel);
     let mut lines = vec![format!(
-        "pixel ({x}, {y}) of {}×{}, offset {:?}, at {secs} s",
-        size.width, size.height, request.offset
+        "pixel ({x}, {y}) of {}×{}, sample {}, offset {:?}, at {secs} s, {}",
+        size.width,
+        size.height,
+        request.sample_index,
+        request.offset,
+        settings.integrator.name()
     )];
     let camera = Camera::new(&view, size);
-    let ray = (camera.ray(request), camera.cone());
-    let (rgb, surface) = world.radiance(&moment, ray, settings, &mut Stack::new(), &mut lines);
+    let (rgb, surface) =
+        world.sample_with(&moment, &camera, request, settings, &mut Stack::new(), &mut lines);
     lines.push(format!("first surface: {surface:?}"));
     let [r, g, b, _] = Display::new(0.0).encode_rgba8(rgb);
     lines.push(format!("linear RGB {rgb:?}, sRGB at exposure 0: {:?}", [r, g, b]));

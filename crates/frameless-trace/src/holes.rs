@@ -9,6 +9,7 @@ use glam::Vec3A;
 use crate::fresnel::Dielectric;
 use crate::matter::{Matter, coverage};
 use crate::moment::Moment;
+use crate::numbers::{self, mixed};
 use crate::point::{Placement, Point};
 use crate::ray::{Hit, Ray};
 use crate::sift::Sieve;
@@ -51,11 +52,11 @@ impl World {
         &self,
         moment: &Moment,
         ray: &Ray,
-        chance: Chance,
+        chance: impl FnOnce() -> Chance,
         stack: &mut Stack,
     ) -> Option<Hit> {
         if self.has_holes {
-            return self.nearest_through(moment, ray, (chance, false), stack);
+            return self.nearest_through(moment, ray, (chance(), false), stack);
         }
         moment.targets(self).closest(ray, stack)
     }
@@ -66,22 +67,16 @@ impl World {
         !point.is_front && has_no_back(self, hit)
     }
 
-    /// The same before the point is known.
-    #[inline(always)]
-    pub(crate) fn shows_its_back(&self, moment: &Moment, ray: &Ray, hit: &Hit) -> bool {
-        has_no_back(self, hit) && !Placement::new(self, moment, ray, hit).is_front
-    }
-
     /// What a camera's ray meets that passes backs: seldom asked, since whoever looks at a closed body from outside meets its front first.
     #[cold]
     pub(crate) fn behind_back(
         &self,
         moment: &Moment,
         ray: &Ray,
-        chance: Chance,
+        chance: impl FnOnce() -> Chance,
         stack: &mut Stack,
     ) -> Option<Hit> {
-        self.nearest_through(moment, ray, (chance, true), stack)
+        self.nearest_through(moment, ray, (chance(), true), stack)
     }
 
     #[inline(never)]
@@ -266,9 +261,5 @@ fn material<'a>(world: &'a World, hit: &Hit) -> Option<&'a Material> {
 
 /// In [0, 1), by a number and a triangle.
 fn unit(number: u32, hit: &Hit) -> f32 {
-    const PART: f32 = 1.0 / (1 << 24) as f32;
-    let bits = crate::path::mixed(
-        number ^ crate::path::mixed(hit.instance ^ crate::path::mixed(hit.primitive)),
-    );
-    (bits >> 8) as f32 * PART
+    numbers::unit(mixed(number ^ mixed(hit.instance ^ mixed(hit.primitive))))
 }

@@ -4,10 +4,13 @@ use frameless::{Request, Size, Surface};
 use frameless_scene::View;
 
 use crate::camera::Camera;
-use crate::direct::NoProbe;
+use crate::direct::{NoProbe, Probe};
+use crate::kernel::Isa;
+#[cfg(target_arch = "x86_64")]
+use crate::kernel::avx2;
 use crate::lens::{self, Lens};
 use crate::moment::Moment;
-use crate::path::numbers_on_lens;
+use crate::numbers::Numbers;
 use crate::traverse::Stack;
 use crate::world::World;
 
@@ -74,30 +77,89 @@ impl World {
         request: &Request,
         settings: &Settings,
     ) -> ([f32; 3], Surface) {
-        self.sample(moment, &Camera::new(view, size), request, settings, &mut Stack::new())
+        let (camera, mut answer) = (Camera::new(view, size), ([0.0; 3], Surface::default()));
+        let (seen, requests) = ((moment, &camera), std::iter::once(*request));
+        let take = |rgb, surface| answer = (rgb, surface);
+        self.samples(seen, requests, settings, &mut Stack::new(), take);
+        answer
     }
 
+    /// Hands the answers to `take`, in the order of the requests. The whole of it has the instructions of the walk: they are also what
+    /// textures and random numbers are glad of.
     #[inline]
-    pub(crate) fn sample(
+    pub(crate) fn samples(
+        &self,
+        (moment, camera): (&Moment, &Camera),
+        requests: impl Iterator<Item = Request>,
+        settings: &Settings,
+        stack: &mut Stack,
+        take: impl FnMut([f32; 3], Surface),
+    ) {
+        let samples = Samples { world: self, moment, camera, requests, settings, stack, take };
+        match self.isa {
+            Isa::Portable => samples.trace(),
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx2(proof) => avx2::with(proof, samples),
+        }
+    }
+
+    /// One sample, with `probe` told of all that happens.
+    #[inline(always)]
+    pub(crate) fn sample_with(
         &self,
         moment: &Moment,
         camera: &Camera,
         request: &Request,
         settings: &Settings,
         stack: &mut Stack,
+        probe: &mut impl Probe,
     ) -> ([f32; 3], Surface) {
         let (ray, cone) = (camera.ray(request), camera.cone());
-        match settings.integrator {
-            Integrator::Direct => self.radiance(moment, (ray, cone), settings, stack, &mut NoProbe),
-            Integrator::Path => match settings.lens {
-                None => self.path_radiance(moment, (ray, cone), request, settings, stack),
-                Some(lens) => {
-                    let through = lens.ray(camera, &ray, numbers_on_lens(request));
-                    let (rgb, surface) =
-                        self.path_radiance(moment, (through, cone), request, settings, stack);
-                    (rgb, lens::in_own_pixel(surface, moment, camera, &ray))
+        match (settings.integrator, settings.lens) {
+            (Integrator::Direct, _) => self.radiance(moment, (ray, cone), settings, stack, probe),
+            (Integrator::Path, lens) => {
+                let through = match lens {
+                    None => ray,
+                    Some(lens) => lens.ray(camera, &ray, Numbers::of(request).lens()),
+                };
+                let (rgb, surface) =
+                    self.path_radiance(moment, (through, cone), request, settings, stack, probe);
+                match lens {
+                    None => (rgb, surface),
+                    Some(_) => (rgb, lens::in_own_pixel(surface, moment, camera, &ray)),
                 }
-            },
+            }
         }
+    }
+}
+
+struct Samples<'a, R, T> {
+    world: &'a World,
+    moment: &'a Moment,
+    camera: &'a Camera,
+    requests: R,
+    settings: &'a Settings,
+    stack: &'a mut Stack,
+    take: T,
+}
+
+impl<R: Iterator<Item = Request>, T: FnMut([f32; 3], Surface)> Samples<'_, R, T> {
+    #[inline(always)]
+    fn trace(self) {
+        let Samples { world, moment, camera, requests, settings, stack, mut take } = self;
+        for request in requests {
+            let (rgb, surface) =
+                world.sample_with(moment, camera, &request, settings, stack, &mut NoProbe);
+            take(rgb, surface);
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl<R: Iterator<Item = Request>, T: FnMut([f32; 3], Surface)> avx2::Task for Samples<'_, R, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        self.trace();
     }
 }

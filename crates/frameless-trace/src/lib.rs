@@ -25,6 +25,7 @@ mod lens;
 mod lights;
 mod matter;
 mod moment;
+mod numbers;
 mod order;
 mod patch;
 mod path;

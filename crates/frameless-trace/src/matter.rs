@@ -60,6 +60,12 @@ impl Matter {
         layers: None,
     };
 
+    /// Whether light is scattered evenly, and nothing else is done with it.
+    #[inline(always)]
+    pub(crate) fn is_matte(&self) -> bool {
+        self.specular <= 0.0 && self.metallic <= 0.0 && self.layers.is_none()
+    }
+
     /// Of a material that [is plain](is_plain). `color`: of the vertices, linear RGBA.
     #[inline(always)]
     pub(crate) fn plain(

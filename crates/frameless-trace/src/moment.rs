@@ -7,6 +7,7 @@ use glam::Affine3A;
 
 use crate::camera::Camera;
 use crate::deforming::Deforming;
+use crate::emitters::Lamps;
 use crate::lights::lights_now;
 use crate::top::{Placed, Shape, Targets, Top, Trees};
 use crate::world::World;
@@ -24,6 +25,7 @@ pub struct Moment {
     /// Whether what stands still does so now; else it is in `top` like everything else.
     standing_holds: bool,
     pub(crate) lights: Vec<Light>,
+    pub(crate) lamps: Lamps,
 }
 
 impl Moment {
@@ -76,6 +78,7 @@ impl World {
             top: Top::new(),
             standing_holds: false,
             lights: Vec::new(),
+            lamps: Lamps::default(),
         };
         self.update_moment(secs, &mut moment);
         moment
@@ -105,6 +108,7 @@ impl World {
         lights_now(self.scene(), &moment.state, &mut moment.lights);
         if !same_world {
             moment.placed.clear();
+            moment.lamps.clear();
             moment.deforming.clone_from(&self.deforming);
         }
         let mut moved = self.place_instances(moment);
@@ -119,6 +123,7 @@ impl World {
             }
             let trees = Trees { rigid: &self.blas, deforming: &moment.deforming };
             moment.top.rebuild(&moment.placed, trees, standing);
+            self.emitters.place(&moment.placed, &mut moment.lamps);
         }
         // No time equals NaN: what the scene shows by itself at this time is another picture.
         moment.shows = Some((self.id, f64::NAN));

@@ -13,21 +13,21 @@
 //! Unbiased but for that limit, and for punctual lights behind glass, which are seen straight through it. Lamps and the environment are not:
 //! they are met through it. Surfaces that blend are there with their alpha as probability. What encloses a volume absorbs e^(−σ·way).
 //!
-//! Random numbers are Owen-scrambled Sobol points (Burley 2020, "Practical Hash-based Owen
-//! Scrambling") by the request's number in its pixel's sequence: the same request has the same answer.
+//! The same request has the same [`Numbers`], and so the same answer.
 
 use frameless::{Request, Surface};
+use frameless_scene::Material;
 use glam::Vec3A;
-use sobol_burley::{NUM_DIMENSION_SETS_4D, sample_4d};
 
 use crate::bsdf::Bsdf;
-use crate::direct::{NoProbe, finite, sky_surface};
+use crate::direct::{Probe, finite, sky_surface};
 #[cfg(doc)]
 use crate::emitters::Emitters;
 use crate::first::FirstSurface;
-use crate::holes::{Chance, attenuation};
+use crate::holes::attenuation;
 use crate::integrator::Settings;
 use crate::moment::Moment;
+use crate::numbers::Numbers;
 use crate::point::Point;
 use crate::ray::Ray;
 use crate::surroundings::FromAfar;
@@ -45,7 +45,8 @@ const NEARLY_THERE: f32 = 1.0 - 1e-4;
 const MOST_LIKELY_ON: f32 = 0.95;
 
 impl World {
-    /// What comes back along a ray, by one random path.
+    /// What comes back along a ray whose direction has unit length, by one random path.
+    #[inline(always)]
     pub(crate) fn path_radiance(
         &self,
         moment: &Moment,
@@ -53,6 +54,7 @@ impl World {
         request: &Request,
         settings: &Settings,
         stack: &mut Stack,
+        probe: &mut impl Probe,
     ) -> ([f32; 3], Surface) {
         let numbers = Numbers::of(request);
         let (mut radiance, mut throughput) = (Vec3A::ZERO, Vec3A::ONE);
@@ -61,23 +63,34 @@ impl World {
         let mut density = None;
         // Absorption per metre of what the path is inside, if that is known.
         let mut inside = None;
-        for depth in 0..=settings.max_depth {
-            let chance = numbers.chance(depth);
-            let mut met = self.nearest(moment, &ray, chance, stack);
-            if depth == 0
-                && let Some(hit) = &met
-                && self.shows_its_back(moment, &ray, hit)
-            {
-                met = self.behind_back(moment, &ray, chance, stack);
-            }
+        let mut depth = 0;
+        // Whether the camera's ray passes backs: it has met one already.
+        let mut culls = false;
+        loop {
+            probe
+                .note(|| format!("ray {depth}: from {:.5} along {:.5}", ray.origin, ray.direction));
+            let chance = || numbers.chance(depth);
+            let met = match culls {
+                false => self.nearest(moment, &ray, chance, stack),
+                true => self.behind_back(moment, &ray, chance, stack),
+            };
             let Some(hit) = met else {
-                radiance += throughput * self.sky_seen(ray.direction, density);
+                let gives = throughput * self.sky_seen(ray.direction, density);
+                probe.note(|| format!("  nothing hit: adds {gives:.6}"));
+                radiance += gives;
                 first.see(self, || sky_surface(&ray), throughput);
                 break;
             };
             let point = Point::new(self, moment, &ray, &hit, cone);
+            probe.note(|| format!("  {hit:?}"));
+            if depth == 0 && !culls && self.is_culled(&hit, &point) {
+                probe.note(|| "  the back of what is single-sided, which the camera passes".into());
+                culls = true;
+                continue;
+            }
             let material = &self.scene().materials[point.material as usize];
-            let way_m = hit.t * ray.direction.length();
+            // Directions have unit length.
+            let way_m = hit.t;
             inside = inside.or_else(|| point.behind(material));
             if let Some(sigma) = inside {
                 throughput *= attenuation(sigma, way_m);
@@ -85,34 +98,43 @@ impl World {
             if material.unlit {
                 // Shown, but no light for others.
                 if density.is_none() {
-                    radiance += throughput * point.matter.base;
+                    let gives = throughput * point.matter.base;
+                    probe.note(|| format!("  unlit: adds {gives:.6}"));
+                    radiance += gives;
                 }
                 first.see(self, || point.unlit(&hit), throughput);
                 break;
             }
-            let bsdf = Bsdf::new(&point, -ray.direction.normalize_or_zero());
+            probe.note(|| describe(&point, material, throughput));
+            let (matter, to_eye) = (&point.matter, -ray.direction);
+            let mut bsdf = Bsdf::undivided(matter, point.normal, to_eye);
+            bsdf.divide_lobes(matter, point.is_front, to_eye);
             let emissive = point.matter.emissive;
             if emissive != Vec3A::ZERO && (point.is_front || material.double_sided) {
                 let place = [hit.instance, hit.primitive];
                 let to_light = hit.t * ray.direction;
-                let other = || self.emitters.density_of(self, moment, place, to_light);
-                radiance += density.map_or(1.0, |own| weight(own, other())) * throughput * emissive;
+                let other = || self.emitters.density_of(&moment.lamps, place, to_light);
+                let met = density.map_or(1.0, |own| weight(own, other()));
+                let gives = met * throughput * emissive;
+                probe.note(|| format!("  emits {emissive:.5}, weighs {met:.4}: adds {gives:.6}"));
+                radiance += gives;
             }
             let is_last = depth == settings.max_depth;
             let mut scattered = Vec3A::ZERO;
-            let asked =
-                self.ask_lights(moment, &point, settings, stack, &mut NoProbe, |arriving| {
-                    scattered += bsdf.scattered(arriving.to_light) * arriving.irradiance;
-                });
+            let asked = self.ask_lights(moment, &point, settings, stack, probe, |arriving| {
+                scattered += bsdf.scattered(arriving.to_light) * arriving.irradiance;
+            });
+            let [to_follow, to_light] = numbers.at_surface(depth);
             if !self.emitters.is_empty() {
-                let numbers = numbers.light(depth);
-                scattered += self.ask_emitters(moment, &point, &bsdf, is_last, numbers, stack);
+                scattered += self.ask_emitters(moment, &point, &bsdf, is_last, to_light, stack);
             }
             if let Some(surroundings) = &self.surroundings {
                 let light = surroundings.sample(numbers.sky(depth));
                 scattered += self.ask_surroundings(moment, &point, &bsdf, is_last, light, stack);
             }
-            radiance += throughput * scattered;
+            let gives = throughput * scattered;
+            probe.note(|| format!("  of lights, lamps and environment: adds {gives:.6}"));
+            radiance += gives;
             let albedo = bsdf.albedo();
             let seen = || point.surface(&hit, albedo, asked.unhindered, asked.lit);
             first.see(self, seen, throughput);
@@ -124,8 +146,7 @@ impl World {
             if is_last {
                 break;
             }
-            let [choice, u, v, roulette] = numbers.direction(depth);
-            let Some(next) = bsdf.sample([choice, u, v]) else { break };
+            let Some(next) = bsdf.sample(to_follow) else { break };
             // A shading normal may lead to the wrong side of the surface itself.
             if (next.direction.dot(point.geometric_normal) <= 0.0) != next.passes {
                 break;
@@ -133,7 +154,8 @@ impl World {
             throughput *= next.weight;
             if depth >= SAFE_DEPTH {
                 let goes_on = throughput.max_element().min(MOST_LIKELY_ON);
-                if roulette >= goes_on {
+                probe.note(|| format!("  goes on with a probability of {goes_on:.4}"));
+                if numbers.roulette(depth) >= goes_on {
                     break;
                 }
                 throughput /= goes_on;
@@ -145,17 +167,18 @@ impl World {
             }
             let origin = if next.passes { point.inside() } else { point.outside };
             ray = Ray { origin, direction: next.direction };
+            depth += 1;
+            culls = false;
         }
         (finite(radiance), first.surface(&ray))
     }
 
     /// What comes from far away, weighed by how else it would have been found than by the path's last direction.
+    #[inline(always)]
     fn sky_seen(&self, direction: Vec3A, density: Option<f32>) -> Vec3A {
-        let sky = self.sky(direction);
+        let sky = self.sky_along(direction);
         match (&self.surroundings, density) {
-            (Some(surroundings), Some(own)) => {
-                weight(own, surroundings.density(direction.normalize_or_zero())) * sky
-            }
+            (Some(surroundings), Some(own)) => weight(own, surroundings.density(direction)) * sky,
             _ => sky,
         }
     }
@@ -182,22 +205,25 @@ impl World {
     }
 
     /// What reaches the eye of one point of what shines.
+    #[inline(always)]
     fn ask_emitters(
         &self,
         moment: &Moment,
         point: &Point,
         bsdf: &Bsdf,
         is_last: bool,
-        numbers: [f32; 3],
+        numbers: [f32; 2],
         stack: &mut Stack,
     ) -> Vec3A {
-        let Some(light) = self.emitters.sample(self, moment, point.shadow_origin, numbers) else {
+        let Some(light) = self.emitters.sample(self, &moment.lamps, point.shadow_origin, numbers)
+        else {
             return Vec3A::ZERO;
         };
-        let direction = light.to_light.normalize_or_zero();
-        if direction.dot(point.geometric_normal) <= 0.0 {
+        if light.to_light.dot(point.geometric_normal) <= 0.0 {
             return Vec3A::ZERO;
         }
+        // It has a length: its density is finite.
+        let direction = light.to_light * light.to_light.length_recip();
         let (scattered, density) = bsdf.towards(direction);
         if scattered == Vec3A::ZERO {
             return Vec3A::ZERO;
@@ -209,68 +235,110 @@ impl World {
     }
 }
 
+fn describe(point: &Point, material: &Material, throughput: Vec3A) -> String {
+    let matter = &point.matter;
+    format!(
+        "  at {:.5}, normal {:.5}, seen from its {}, throughput {throughput:.5}\n  material {} \"{}\", base colour {:.5}, metallic \
+         {:.3}, roughness {:.3}",
+        point.position,
+        point.normal,
+        if point.is_front { "front" } else { "back" },
+        point.material,
+        material.name,
+        matter.base,
+        matter.metallic,
+        matter.roughness,
+    )
+}
+
 /// Of a finding that had this density, and in another way would have had the other.
 fn weight(own: f32, other: f32) -> f32 {
     own / (own + other)
 }
 
-/// The random numbers of one request.
-#[derive(Clone, Copy)]
-struct Numbers {
-    index: u32,
-    seed: u32,
-}
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
 
-impl Numbers {
-    fn of(request: &Request) -> Numbers {
-        // The sequence has 2¹⁶ points; then another begins.
-        let (index, turn) = (request.sample_index & 0xffff, request.sample_index >> 16);
-        Numbers { index, seed: mixed(mixed(request.pixel) ^ turn) }
+    use frameless::Size;
+    use frameless_scene::{Geometry, Material, Scene, Transform};
+    use glam::{Vec3, Vec4};
+
+    use super::*;
+    use crate::test_scenes::{self as scenes, CAMERA};
+    use crate::{Integrator, Still, render_still, thread_pool};
+
+    /// Mean of what is seen with paths that end after so many surfaces.
+    fn mean(scene: Scene, max_depth: u32, samples: u32) -> Vec3 {
+        let world = World::new(Arc::new(scene));
+        let settings =
+            Settings { integrator: Integrator::Path, max_depth, lens: None, surfaces: false };
+        let (secs, view, size) = (0.0, CAMERA, Size::new(8, 8));
+        let still = Still { secs, view, size, settings, samples, first_sample: 0 };
+        let picture = render_still(&world, &still, &thread_pool(1), || ());
+        picture.iter().copied().map(Vec3::from).sum::<Vec3>() / picture.len() as f32
     }
 
-    /// In [0, 1), for the direction that a path takes from the surface that it meets after `depth` others: three, and one for roulette.
-    fn direction(&self, depth: u32) -> [f32; 4] {
-        self.four(depth, 0)
+    /// A closed room around the camera whose walls glow.
+    fn room(albedo: f32, glows: f32) -> Scene {
+        let mut scene = scenes::empty();
+        scene.materials.push(Material {
+            base_color: Vec3::splat(albedo).extend(1.0),
+            emissive: Vec3::splat(glows),
+            specular: 0.0,
+            double_sided: true,
+            ..Material::default()
+        });
+        let room = Transform { scale: Vec3::new(9.0, 7.0, 8.0), ..Transform::IDENTITY };
+        scenes::add(&mut scene, scenes::triangle_sphere(8, 12, 0), room);
+        scene
     }
 
-    /// For a point of what shines.
-    fn light(&self, depth: u32) -> [f32; 3] {
-        let [pick, s, t, _] = self.four(depth, 1);
-        [pick, s, t]
+    /// e Σ ρᵏ up to k = max_depth + 1: the last surface asks for light once more. Roulette begins after the fourth: it must change nothing.
+    #[test]
+    fn every_surface_adds_its_bounce_and_roulette_takes_none_away() {
+        for (albedo, max_depth) in [(0.5f32, 0), (0.5, 1), (0.8, 2), (0.8, 3), (0.5, 8), (0.9, 8)] {
+            let want: f32 = (0..=max_depth + 1).map(|k| 0.3 * albedo.powi(k as i32)).sum();
+            let got = mean(room(albedo, 0.3), max_depth, 4096).x;
+            assert!((got - want).abs() < 0.01 * want, "{albedo}, {max_depth}: {got}, not {want}");
+        }
     }
 
-    /// For a direction of the environment.
-    fn sky(&self, depth: u32) -> [f32; 2] {
-        let [s, t, ..] = self.four(depth, 2);
-        [s, t]
+    #[test]
+    fn ways_to_find_the_same_light_weigh_one_together() {
+        for (own, other) in [(1.0, 1.0), (1e-6, 3.0), (7.5, 0.0), (1e20, 1.0)] {
+            assert_eq!(weight(own, other) + weight(other, own), 1.0);
+        }
     }
 
-    #[inline]
-    fn four(&self, depth: u32, part: u32) -> [f32; 4] {
-        // 21 surfaces have sets of their own; one set is left over, for the lens.
-        const TURN: u32 = NUM_DIMENSION_SETS_4D / 3;
-        let (surface, turn) = (depth % TURN, depth / TURN);
-        sample_4d(self.index, 3 * surface + part, mixed(self.seed ^ turn))
+    /// A matte white body in a white sky cannot be seen, whether the sky is asked for its light or only met.
+    #[test]
+    fn a_white_furnace_is_white() {
+        let mut scene = scenes::empty();
+        scene.sky = [Vec3::ONE; 2];
+        let (base_color, specular) = (Vec4::ONE, 0.0);
+        scene.materials.push(Material { base_color, specular, ..Material::default() });
+        scenes::add(&mut scene, Geometry::Sphere { material: 0 }, scenes::at(0.0, 0.0, 0.0));
+        let met = mean(scene.clone(), 1000, 64);
+        assert!((met - 1.0).abs().max_element() < 1e-4, "{met}");
+        let texels = Arc::new(vec![[1.0; 3]; 32]);
+        let (width, height, rotation_rad, strength) = (8, 4, 0.0, 1.0);
+        let name = String::new();
+        scene.environment = Some(frameless_scene::Environment {
+            name,
+            width,
+            height,
+            texels,
+            rotation_rad,
+            strength,
+        });
+        let asked = mean(scene, 1000, 4096);
+        assert!((asked - 1.0).abs().max_element() < 0.01, "{asked}");
     }
 
-    /// For the ray that goes there: whether what blends is there.
-    fn chance(&self, depth: u32) -> Chance {
-        Chance::By(mixed(self.seed ^ mixed(self.index ^ (depth << 16))))
+    /// A path's last surface finds light by asking alone; what is behind a corner it cannot ask for.
+    #[test]
+    fn what_does_not_glow_and_is_not_lit_is_black() {
+        assert_eq!(mean(room(0.8, 0.0), 8, 16), Vec3::ZERO);
     }
-}
-
-/// For the place on the lens: the last set of dimensions, which no surface uses.
-pub(crate) fn numbers_on_lens(request: &Request) -> [f32; 2] {
-    let Numbers { index, seed } = Numbers::of(request);
-    let [u, v, ..] = sample_4d(index, NUM_DIMENSION_SETS_4D - 1, seed);
-    [u, v]
-}
-
-/// Every bit of the result depends on every bit of the number ("lowbias32", Wellons 2018).
-pub(crate) fn mixed(mut x: u32) -> u32 {
-    x ^= x >> 16;
-    x = x.wrapping_mul(0x7feb_352d);
-    x ^= x >> 15;
-    x = x.wrapping_mul(0x846c_a68b);
-    x ^ (x >> 16)
 }

@@ -134,7 +134,88 @@ fn area(polygon: &[Vec2]) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use frameless_scene::{Geometry, Material};
+
     use super::*;
+    use crate::test_scenes as scenes;
+
+    fn scene() -> Scene {
+        let mirror = Material { metallic: 1.0, roughness: 0.0, ..Material::default() };
+        Scene { materials: vec![mirror, Material::default()], ..Scene::default() }
+    }
+
+    fn mesh(positions: &[[f32; 3]], triangles: Vec<[u32; 3]>) -> Mesh {
+        let positions = positions.iter().copied().map(Vec3::from).collect();
+        match scenes::mesh(positions, triangles, 0) {
+            Geometry::Mesh(mesh) => mesh,
+            Geometry::Sphere { .. } => unreachable!("it is made of triangles"),
+        }
+    }
+
+    /// From (0, 0, 0) to (1, 2, 3): corner number xyz in bits.
+    fn block() -> Mesh {
+        let corner = |k: usize| [(k >> 2) as f32, 2.0 * (k >> 1 & 1) as f32, 3.0 * (k & 1) as f32];
+        let sides =
+            [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
+        let halves = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        mesh(&std::array::from_fn::<_, 8, _>(corner), halves)
+    }
+
+    #[test]
+    fn a_block_has_six_mirrors_of_four_edges() {
+        let (plane_of, planes) = planes(&scene(), &block());
+        let pairs: Vec<Option<u16>> = (0..12).map(|triangle| Some(triangle / 2)).collect();
+        assert_eq!((plane_of, planes.len()), (pairs, 6));
+        let outwards = [Vec3A::NEG_X, Vec3A::X, Vec3A::NEG_Y, Vec3A::Y, Vec3A::NEG_Z, Vec3A::Z];
+        for (plane, outwards) in planes.iter().zip(outwards) {
+            assert!(plane.normal.abs_diff_eq(outwards, 1e-6), "{plane:?}");
+            assert_eq!(plane.outline.len(), 4);
+            let middle = plane.outline.iter().sum::<Vec3A>() / 4.0;
+            for (k, &corner) in plane.outline.iter().enumerate() {
+                assert!((corner - plane.point).dot(plane.normal).abs() < 1e-5, "off its plane");
+                let edge = plane.outline[(k + 1) % 4] - corner;
+                assert!(edge.cross(middle - corner).dot(plane.normal) > 0.0, "clockwise");
+            }
+        }
+    }
+
+    #[test]
+    fn only_triangles_that_mirror_and_nothing_else_count() {
+        let mut block = block();
+        block.triangle_materials[0] = 1;
+        // Half a side is a triangle, which is convex as well.
+        let (plane_of, found) = planes(&scene(), &block);
+        assert_eq!((plane_of[0], found.len()), (None, 6));
+        assert_eq!(found[0].outline.len(), 3);
+        block.triangle_materials.fill(1);
+        assert!(planes(&scene(), &block).1.is_empty());
+    }
+
+    #[test]
+    fn what_is_not_convex_is_no_mirror() {
+        let corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
+        let corners = corners.map(|[x, y]| [x, y, 0.0]);
+        let bent = mesh(&corners, vec![[0, 1, 3], [1, 2, 3], [0, 3, 5], [3, 4, 5]]);
+        assert!(planes(&scene(), &bent).1.is_empty());
+        let straight = mesh(&corners, vec![[0, 1, 3], [1, 2, 3]]);
+        assert_eq!(planes(&scene(), &straight).1.len(), 1);
+    }
+
+    #[test]
+    fn what_is_curved_or_shaded_as_if_it_were_is_no_mirror() {
+        let Geometry::Mesh(ball) = scenes::triangle_sphere(6, 8, 0) else { unreachable!() };
+        assert!(planes(&scene(), &ball).1.is_empty());
+        let mut block = block();
+        block.normals = block.positions.iter().map(|p| (p - Vec3::ONE).normalize()).collect();
+        assert!(planes(&scene(), &block).1.is_empty());
+    }
+
+    #[test]
+    fn parallel_planes_are_two_mirrors() {
+        let [near, far] = [0.0, 1e-3].map(|z| [[0.0, 0.0, z], [1.0, 0.0, z], [0.0, 1.0, z]]);
+        let panes = mesh(&[near, far].concat(), vec![[0, 1, 2], [3, 4, 5]]);
+        assert_eq!(planes(&scene(), &panes).0, [Some(0), Some(1)]);
+    }
 
     #[test]
     fn hulls_have_no_points_on_their_edges() {

@@ -55,13 +55,11 @@ pub fn render_still(
         let rows = image.par_chunks_mut(size.width as usize).zip(0..size.height);
         rows.for_each_init(Stack::new, |stack, (row, y)| {
             for (x, colour) in (0..).zip(row) {
+                let numbers = (0..samples).map(|k| still.first_sample.wrapping_add(k));
+                let requests = numbers.map(|n| Request::in_sequence(size.index(x, y), n));
                 let mut sum = Vec3::ZERO;
-                for k in 0..samples {
-                    let number = still.first_sample.wrapping_add(k);
-                    let request = Request::in_sequence(size.index(x, y), number);
-                    let (rgb, _) = world.sample(&moment, &camera, &request, &still.settings, stack);
-                    sum += Vec3::from(rgb);
-                }
+                let add = |rgb: [f32; 3], _| sum += Vec3::from(rgb);
+                world.samples((&moment, &camera), requests, &still.settings, stack, add);
                 *colour = (sum / samples as f32).to_array();
             }
             row_done();

@@ -13,7 +13,7 @@ use glam::{Quat, Vec3};
 
 use crate::kernel::Isa;
 use crate::test_scenes::{self as scenes, CAMERA, SIZE};
-use crate::{CpuTracer, Settings, ViewSource, World, explain, render, thread_pool};
+use crate::{CpuTracer, Integrator, Settings, ViewSource, World, explain, render, thread_pool};
 
 fn picture(scene: Scene) -> Vec<[f32; 3]> {
     let world = World::new(Arc::new(scene));
@@ -368,21 +368,23 @@ fn the_view_is_that_of_the_submission() {
 #[test]
 fn an_explanation_adds_up_to_the_colour() {
     let world = World::new(scenes::mixed());
-    let settings = Settings::default();
-    let mut longest = 0;
-    for pixel in 0..SIZE.pixels() as u32 {
-        let request = Request::centre(pixel);
-        let lines = explain(&world, 0.0, &CAMERA, SIZE, &request, &settings);
-        let moment = world.moment(0.0);
-        let view = CAMERA.at(world.scene(), moment.state());
-        let (rgb, _) = world.trace(&moment, &view, SIZE, &request, &settings);
-        assert!(lines.last().unwrap().contains(&format!("{rgb:?}")), "{lines:#?}");
-        let sum: Vec3 = lines.iter().filter_map(|line| added(line)).sum();
-        // Printed with six digits after the point, at most five terms.
-        assert!((sum - Vec3::from(rgb)).abs().max_element() < 5e-6, "{sum} {lines:#?}");
-        longest = longest.max(lines.len());
+    for integrator in Integrator::ALL {
+        let settings = Settings { integrator, ..Settings::default() };
+        let mut longest = 0;
+        for pixel in 0..SIZE.pixels() as u32 {
+            let request = Request::in_sequence(pixel, 3);
+            let lines = explain(&world, 0.0, &CAMERA, SIZE, &request, &settings);
+            let moment = world.moment(0.0);
+            let view = CAMERA.at(world.scene(), moment.state());
+            let (rgb, _) = world.trace(&moment, &view, SIZE, &request, &settings);
+            assert!(lines.last().unwrap().contains(&format!("{rgb:?}")), "{lines:#?}");
+            let sum: Vec3 = lines.iter().filter_map(|line| added(line)).sum();
+            // Printed with six digits after the point, at most six terms.
+            assert!((sum - Vec3::from(rgb)).abs().max_element() < 6e-6, "{sum} {lines:#?}");
+            longest = longest.max(lines.len());
+        }
+        assert!(longest > 20, "mirrors have something to tell: {longest} lines");
     }
-    assert!(longest > 20, "mirrors have something to tell: {longest} lines");
 }
 
 /// What a line of an explanation says that it adds: `… adds [r, g, b]`.

@@ -39,18 +39,20 @@ fn integral(cos: f32, roughness: f32) -> f32 {
         let sin = (1.0 - cos * cos).sqrt();
         Vec3A::new(sin * phi.cos(), sin * phi.sin(), cos)
     });
-    let sum: f32 = directions.map(|to_light| raw(to_eye, to_light, roughness) * to_light.z).sum();
+    let sent = |to_light: Vec3A| {
+        let half = (to_eye + to_light).normalize_or(Vec3A::Z);
+        raw([to_eye.z, to_light.z], half.z, roughness) * to_light.z
+    };
+    let sum: f32 = directions.map(sent).sum();
     sum * TAU / (STEPS * STEPS) as f32
 }
 
-/// D V; z is along the normal.
-fn raw(to_eye: Vec3A, to_light: Vec3A, roughness: f32) -> f32 {
+/// D V; o, i, h: cosines to the normal of both directions and of the one between them.
+fn raw([o, i]: [f32; 2], h: f32, roughness: f32) -> f32 {
     let roughness = roughness.clamp(SMOOTHEST, 1.0);
     let sharpness = 1.0 / (roughness * roughness);
-    let half = (to_eye + to_light).normalize_or(Vec3A::Z);
-    let sin = (1.0 - half.z * half.z).max(0.0).sqrt();
+    let sin = (1.0 - h * h).max(0.0).sqrt();
     let fibres = (2.0 + sharpness) * sin.powf(sharpness) / TAU;
-    let (o, i) = (to_eye.z, to_light.z);
     fibres / (4.0 * (o + i - o * i)).max(1e-4)
 }
 
@@ -74,8 +76,8 @@ pub(crate) fn albedo(cos: f32, roughness: f32) -> f32 {
     looked_up(cos, roughness).clamp(0.0, 1.0)
 }
 
-/// f of white fibres. Both directions are above the surface, z along the normal.
-pub(crate) fn value(to_eye: Vec3A, to_light: Vec3A, roughness: f32) -> f32 {
-    let most = looked_up(to_eye.z, roughness).max(looked_up(to_light.z, roughness));
-    raw(to_eye, to_light, roughness) / most.max(1.0)
+/// f of white fibres; o, i, h: cosines to the normal of both directions, which are above the surface, and of the one between them.
+pub(crate) fn value([o, i]: [f32; 2], h: f32, roughness: f32) -> f32 {
+    let most = looked_up(o, roughness).max(looked_up(i, roughness));
+    raw([o, i], h, roughness) / most.max(1.0)
 }

@@ -88,12 +88,17 @@ impl World {
     /// by the direction's height.
     #[inline]
     pub(crate) fn sky(&self, direction: Vec3A) -> Vec3A {
+        self.sky_along(direction.normalize_or_zero())
+    }
+
+    /// The same along a direction of unit length.
+    #[inline(always)]
+    pub(crate) fn sky_along(&self, direction: Vec3A) -> Vec3A {
         if let Some(surroundings) = &self.surroundings {
-            return surroundings.radiance(direction.normalize_or_zero());
+            return surroundings.radiance(direction);
         }
         let [down, up] = self.scene.sky.map(Vec3A::from);
-        let height = direction.normalize_or_zero().y;
-        down.lerp(up, 0.5 + 0.5 * height)
+        down.lerp(up, 0.5 + 0.5 * direction.y)
     }
 
     /// What a white matte surface that nothing shades sends back of ambient light.

@@ -61,6 +61,7 @@ impl Request {
 
     /// Number `sample_index` of the pixel's sequence: an additive recurrence with the plastic number (Roberts 2018, "The
     /// unreasonable effectiveness of quasirandom sequences"), whose number 0 is the centre.
+    #[inline]
     pub fn in_sequence(pixel: u32, sample_index: u32) -> Request {
         const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
         // Below 2³², so that a whole number holds what is before the point: faster than a call of `fract`.
@@ -72,6 +73,7 @@ impl Request {
 
     /// Image position of the ray, in pixels from the picture's top-left **corner**; the centre of the
     /// first pixel is (0.5, 0.5).
+    #[inline]
     pub fn position_px(&self, size: Size) -> [f32; 2] {
         let (x, y) = size.xy(self.pixel);
         [x as f32 + 0.5 + self.offset[0], y as f32 + 0.5 + self.offset[1]]

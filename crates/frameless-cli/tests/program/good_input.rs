@@ -81,8 +81,16 @@ fn tone_mapping_keeps_what_would_be_clipped_apart() {
 
 #[test]
 fn a_pixel_is_told_step_by_step() {
-    let told = frameless(&["trace", "sphere", "--pixel", "256,192", "--time", "0.5"]);
-    assert!(told.succeeded().out.lines().count() > 3);
+    let pixel = ["trace", "sphere", "--pixel", "256,192", "--time", "0.5"];
+    let direct = frameless(&pixel).succeeded().out;
+    assert!(direct.lines().count() > 3);
+    let path = |sample| {
+        let chosen = ["--integrator", "path", "--sample", sample];
+        frameless(&[&pixel[..], &chosen].concat()).succeeded().out
+    };
+    assert!(path("0").contains(", path\n") && !direct.contains(", path\n"));
+    assert_eq!(path("7"), path("7"));
+    assert_ne!(path("7"), path("8"));
 }
 
 /// Two scenes, and three animations of which the first and the last move the same node.

@@ -23,15 +23,14 @@ mod ggx;
 #[cfg(test)]
 mod tests;
 
-use std::f32::consts::{FRAC_1_PI, TAU};
+use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3A;
 
 use crate::fresnel::{Dielectric, USUAL, refracted, schlick};
 use crate::matter::{LayersHere, Matter};
-use crate::point::Point;
 use crate::sheen;
-use ggx::{GRAZING, Ggx};
+use ggx::{GRAZING, Ggx, frame, sin_cos_turns};
 
 /// A surface's scattering, seen from one direction.
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +46,8 @@ pub(crate) struct Bsdf {
     glass: Option<Glass>,
     coat: Option<Coat>,
     fibres: Option<Fibres>,
+    /// Whether it scatters evenly and does nothing else.
+    is_matte: bool,
     /// Probabilities with which [`Bsdf::sample`] takes each lobe, up to and with it: highlight, coat, glass, matte.
     up_to: [f32; 4],
 }
@@ -94,35 +95,41 @@ const GLASS: usize = 2;
 const MATTE: usize = 3;
 
 impl Bsdf {
-    /// `to_eye`: unit length, world coordinates.
-    #[inline]
-    pub(crate) fn new(point: &Point, to_eye: Vec3A) -> Bsdf {
-        Bsdf::of(&point.matter, point.normal, point.is_front, to_eye)
-    }
-
-    /// `normal`: unit length, world coordinates, on the side of `to_eye`.
+    /// What has no lobes but a matte one; all others are [divided](Bsdf::divide_lobes) next, in place: it is too large to be moved.
+    /// `to_eye`: unit length, world coordinates, on the side of the point's normal.
     #[inline(always)]
-    fn of(matter: &Matter, normal: Vec3A, is_front: bool, to_eye: Vec3A) -> Bsdf {
+    pub(crate) fn undivided(matter: &Matter, normal: Vec3A, to_eye: Vec3A) -> Bsdf {
         let metallic = matter.metallic.clamp(0.0, 1.0);
-        let dielectric = Dielectric::new(matter);
-        let mean = dielectric.mean_reflectance().max_element();
-        let mut bsdf = Bsdf {
+        Bsdf {
             base: Ggx::new(normal, to_eye, matter.roughness),
             diffuse: (1.0 - metallic) * matter.base,
             metal: matter.base,
             metallic,
-            dielectric,
-            under: if mean < 0.999 { 1.0 / (1.0 - mean) } else { 0.0 },
+            dielectric: Dielectric::new(matter),
+            under: 1.0,
             glass: None,
             coat: None,
             fibres: None,
-            up_to: [0.0; 4],
-        };
-        match matter.layers.as_deref() {
-            None => bsdf.divide_in_two(),
-            Some(layers) => bsdf.add(layers, is_front, to_eye),
+            is_matte: matter.is_matte(),
+            up_to: [0.0, 0.0, 0.0, 1.0],
         }
-        bsdf
+    }
+
+    /// The same arguments again.
+    #[inline(always)]
+    pub(crate) fn divide_lobes(&mut self, matter: &Matter, is_front: bool, to_eye: Vec3A) {
+        if !self.is_matte {
+            self.divide_glossy(matter, is_front, to_eye);
+        }
+    }
+
+    fn divide_glossy(&mut self, matter: &Matter, is_front: bool, to_eye: Vec3A) {
+        let mean = self.dielectric.mean_reflectance().max_element();
+        self.under = if mean < 0.999 { 1.0 / (1.0 - mean) } else { 0.0 };
+        match matter.layers.as_deref() {
+            None => self.divide_in_two(),
+            Some(layers) => self.add(layers, is_front, to_eye),
+        }
     }
 
     #[inline(never)]
@@ -148,7 +155,7 @@ impl Bsdf {
     /// Multiplies `under` by what passes on the way to the eye, and [divides](Bsdf::divide) what has no layers.
     #[inline(always)]
     fn divide_in_two(&mut self) {
-        let cos = self.base.to_eye.z;
+        let cos = self.base.cos;
         let below = 1.0 - self.dielectric_fresnel(cos).max_element();
         self.under *= below;
         let [highlight, matte] = [self.fresnel(cos), below * self.diffuse].map(Vec3A::element_sum);
@@ -162,7 +169,7 @@ impl Bsdf {
     /// Chooses how often each lobe is taken: as much as it scatters of what all do, but none seldom that scatters at all; up to ten times
     /// as often.
     fn divide(&mut self) {
-        let cos = self.base.to_eye.z;
+        let cos = self.base.cos;
         let film = self.coat.as_ref().map_or(0.0, Coat::reflectance);
         let fibres = self.fibres.as_ref().map_or(0.0, |fibres| fibres.lit(cos));
         let below = Vec3A::splat(1.0 - self.dielectric_fresnel(cos).max_element());
@@ -217,24 +224,27 @@ impl Bsdf {
     }
 
     /// f · cos and the density.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn towards(&self, direction: Vec3A) -> (Vec3A, f32) {
-        let to_light = self.base.local(direction);
-        if to_light.z <= 0.0 {
+        let i = self.base.normal.dot(direction);
+        if i <= 0.0 {
             return (Vec3A::ZERO, 0.0);
         }
-        let i = to_light.z;
+        if self.is_matte {
+            let density = i * FRAC_1_PI;
+            return (self.diffuse * density, density);
+        }
         let mut f = self.diffuse * (self.below(i) * FRAC_1_PI);
         let mut density = self.probability(MATTE) * i * FRAC_1_PI;
         // What never reflects has no highlight either.
         if self.up_to[HIGHLIGHT] > 0.0 && self.base.alpha > 0.0 {
-            let half = self.base.half(to_light);
-            let (value, its_density) = self.base.towards(to_light, half);
-            f += self.fresnel(to_light.dot(half)) * value;
+            let half = self.base.half(direction);
+            let (value, its_density) = self.base.towards(i, half);
+            f += self.fresnel(direction.dot(half)) * value;
             density += self.up_to[HIGHLIGHT] * its_density;
         }
         if self.has_layers() {
-            self.add_layers(direction, to_light, &mut f, &mut density);
+            self.add_layers(direction, i, &mut f, &mut density);
         }
         (f * i, density)
     }
@@ -244,40 +254,55 @@ impl Bsdf {
     }
 
     #[inline(never)]
-    fn add_layers(&self, direction: Vec3A, to_light: Vec3A, f: &mut Vec3A, density: &mut f32) {
+    fn add_layers(&self, direction: Vec3A, i: f32, f: &mut Vec3A, density: &mut f32) {
         if let Some(fibres) = &self.fibres {
-            let below = fibres.dim(self.base.to_eye.z, to_light.z);
-            let value = sheen::value(self.base.to_eye, to_light, fibres.roughness);
+            let below = fibres.dim(self.base.cos, i);
+            let h = self.base.normal.dot(self.base.half(direction));
+            let value = sheen::value([self.base.cos, i], h, fibres.roughness);
             *f = below * *f + fibres.color * value;
         }
         if let Some(coat) = &self.coat {
             *f = coat.under(direction) * *f + Vec3A::splat(coat.value(direction));
-            let of_film = coat.film.density(coat.film.local(direction));
+            let of_film = coat.film.density(direction);
             *density += self.probability(COAT) * of_film;
         }
     }
 
-    /// A direction for three random numbers in [0, 1); `None` where it would go into the surface.
-    pub(crate) fn sample(&self, [choice, u, v]: [f32; 3]) -> Option<Scattered> {
-        let lobe = self.up_to.iter().position(|&up_to| choice < up_to).unwrap_or(MATTE);
+    /// A direction for two random numbers in [0, 1); `None` where it would go into the surface.
+    #[inline(always)]
+    pub(crate) fn sample(&self, numbers: [f32; 2]) -> Option<Scattered> {
+        if self.is_matte {
+            // Everything cancels out but the albedo.
+            let local = cosine(numbers);
+            let (direction, density) = (frame(self.base.normal) * local, local.z * FRAC_1_PI);
+            let (weight, density) = (self.diffuse, Some(density));
+            return Some(Scattered { direction, weight, density, alpha: 1.0, passes: false });
+        }
+        self.sample_lobe(numbers)
+    }
+
+    #[inline(never)]
+    fn sample_lobe(&self, [u, v]: [f32; 2]) -> Option<Scattered> {
+        let lobe = self.up_to.iter().position(|&up_to| u < up_to).unwrap_or(MATTE);
+        // What is left of the number that has chosen is as even as it was.
+        let before = if lobe > 0 { self.up_to[lobe - 1] } else { 0.0 };
+        let u = ((u - before) / self.probability(lobe)).clamp(0.0, 1.0);
         let base = &self.base;
         match (lobe, &self.coat, &self.glass) {
             (HIGHLIGHT, ..) if base.alpha == 0.0 => {
-                let direction = base.frame * base.sample([u, v]);
-                let fresnel = self.below_layers(direction) * self.fresnel(base.to_eye.z);
+                let direction = base.sample([u, v]);
+                let fresnel = self.below_layers(direction) * self.fresnel(base.cos);
                 Some(mirrored(direction, fresnel / self.probability(HIGHLIGHT)))
             }
-            (HIGHLIGHT, ..) => self.scatter(base.frame * base.sample([u, v]), base.alpha),
+            (HIGHLIGHT, ..) => self.scatter(base.sample([u, v]), base.alpha),
             (COAT, Some(coat), _) if coat.film.alpha == 0.0 => {
-                let direction = coat.film.frame * coat.film.sample([u, v]);
+                let direction = coat.film.sample([u, v]);
                 let part = coat.reflectance() / self.probability(COAT);
                 Some(mirrored(direction, Vec3A::splat(part)))
             }
-            (COAT, Some(coat), _) => {
-                self.scatter(coat.film.frame * coat.film.sample([u, v]), coat.film.alpha)
-            }
+            (COAT, Some(coat), _) => self.scatter(coat.film.sample([u, v]), coat.film.alpha),
             (GLASS, _, Some(glass)) => self.pass(glass, [u, v]),
-            _ => self.scatter(base.frame * cosine([u, v]), 1.0),
+            _ => self.scatter(frame(base.normal) * cosine([u, v]), 1.0),
         }
     }
 
@@ -298,24 +323,25 @@ impl Bsdf {
             refracted(base.to_eye, normal, if glass.is_inside { ior } else { 1.0 / ior })?
         } else {
             // What would be reflected, behind the wall.
-            (2.0 * cos * normal - base.to_eye) * Vec3A::new(1.0, 1.0, -1.0)
+            let reflected = 2.0 * cos * normal - base.to_eye;
+            reflected - 2.0 * reflected.dot(base.normal) * base.normal
         };
-        if direction.z >= 0.0 {
+        let behind = -direction.dot(base.normal);
+        if behind <= 0.0 {
             return None;
         }
         let below = 1.0 - self.dielectric_fresnel(cos).max_element();
-        let world = base.frame * direction;
-        let part = below * base.left_over(-direction.z) / self.probability(GLASS);
-        let weight = self.below_layers(world) * part * glass.clear;
+        let part = below * base.left_over(behind) / self.probability(GLASS);
+        let weight = self.below_layers(direction) * part * glass.clear;
         let (density, alpha) = (None, base.alpha);
-        Some(Scattered { direction: world, weight, density, alpha, passes: true })
+        Some(Scattered { direction, weight, density, alpha, passes: true })
     }
 
     /// What coat and fibres leave of light that what is below them scatters there.
     fn below_layers(&self, direction: Vec3A) -> f32 {
-        let i = self.base.local(direction).z.abs();
+        let i = self.base.normal.dot(direction).abs();
         let coat = self.coat.as_ref().map_or(1.0, |coat| coat.under(direction));
-        coat * self.fibres.as_ref().map_or(1.0, |fibres| fibres.dim(self.base.to_eye.z, i))
+        coat * self.fibres.as_ref().map_or(1.0, |fibres| fibres.dim(self.base.cos, i))
     }
 
     /// F; `cos`: between a direction and the normal that reflects it.
@@ -351,19 +377,18 @@ fn kept(part: f32) -> f32 {
 impl Coat {
     /// As a mirror.
     fn reflectance(&self) -> f32 {
-        self.part * film_fresnel(self.film.to_eye.z)
+        self.part * film_fresnel(self.film.cos)
     }
 
     fn value(&self, direction: Vec3A) -> f32 {
-        let to_light = self.film.local(direction);
-        let cos = to_light.dot(self.film.half(to_light));
-        self.part * film_fresnel(cos) * self.film.value(to_light)
+        let cos = direction.dot(self.film.half(direction));
+        self.part * film_fresnel(cos) * self.film.value(direction)
     }
 
     /// What it leaves of light from a direction that what is below scatters.
     fn under(&self, direction: Vec3A) -> f32 {
         let passes = |cos: f32| 1.0 - self.part * film_fresnel(cos);
-        passes(self.film.to_eye.z) * passes(self.film.local(direction).z.abs())
+        passes(self.film.cos) * passes(self.film.normal.dot(direction).abs())
     }
 }
 
@@ -391,7 +416,8 @@ fn mirrored(direction: Vec3A, weight: Vec3A) -> Scattered {
 }
 
 /// By the cosine to the normal: a disc lifted onto the hemisphere.
+#[inline(always)]
 fn cosine([u, v]: [f32; 2]) -> Vec3A {
-    let (radius, (sin, cos)) = (u.sqrt(), (TAU * v).sin_cos());
+    let (radius, [sin, cos]) = (u.sqrt(), sin_cos_turns(v));
     Vec3A::new(radius * cos, radius * sin, (1.0 - u).max(GRAZING * GRAZING).sqrt())
 }

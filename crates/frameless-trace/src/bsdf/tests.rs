@@ -1,5 +1,7 @@
 //! Scattering against its own integrals, and against light that is conserved.
 
+use std::f32::consts::TAU;
+
 use super::*;
 use crate::matter::LayersHere;
 
@@ -37,6 +39,7 @@ fn matters() -> Vec<Matter> {
     let tinted = LayersHere { specular_color: Vec3A::new(5.0, 0.1, 2.0), ..layers() };
     vec![
         plain(0.0, 1.0),
+        Matter { specular: 0.0, ..plain(0.0, 0.3) },
         plain(0.0, 0.5),
         plain(1.0, 0.3),
         plain(1.0, 1.0),
@@ -60,7 +63,13 @@ fn tilted(tilt_rad: f32) -> Vec3A {
 }
 
 fn seen(matter: &Matter, to_eye: Vec3A) -> Bsdf {
-    Bsdf::of(matter, NORMAL, true, to_eye)
+    of(matter, true, to_eye)
+}
+
+fn of(matter: &Matter, is_front: bool, to_eye: Vec3A) -> Bsdf {
+    let mut bsdf = Bsdf::undivided(matter, NORMAL, to_eye);
+    bsdf.divide_lobes(matter, is_front, to_eye);
+    bsdf
 }
 
 /// Directions over the hemisphere, all weighing the same: (n + ½)/N in cos and φ.
@@ -74,9 +83,11 @@ fn hemisphere(per_side: u32) -> impl Iterator<Item = Vec3A> {
     })
 }
 
-fn grid(per_side: u32) -> impl Iterator<Item = [f32; 3]> {
-    let at = move |i: u32| ((i % per_side) as f32 + 0.5) / per_side as f32;
-    (0..per_side.pow(3)).map(move |i| [at(i), at(i / per_side), at(i / per_side / per_side)])
+/// Finer in the first number, which also chooses the lobe.
+fn grid(per_side: u32) -> impl Iterator<Item = [f32; 2]> {
+    let at = move |i: u32, steps: u32| ((i % steps) as f32 + 0.5) / steps as f32;
+    let squared = per_side.pow(2);
+    (0..per_side.pow(3)).map(move |i| [at(i, squared), at(i / squared, per_side)])
 }
 
 #[test]
@@ -86,9 +97,8 @@ fn densities_add_up_to_the_samples_that_stay_above() {
             let bsdf = seen(&matter, tilted(tilt));
             let sum: f64 = hemisphere(800).map(|w| f64::from(bsdf.density(w))).sum();
             let integral = sum * f64::from(TAU) / (800.0 * 800.0);
-            let stays = |u: &[f32; 3]| bsdf.sample(*u).is_some_and(|s| s.density.is_some());
+            let stays = |u: &[f32; 2]| bsdf.sample(*u).is_some_and(|s| s.density.is_some());
             let above = grid(64).filter(stays).count() as f64 / 64f64.powi(3);
-            // Probabilities are told in steps of 1/64.
             assert!((integral - above).abs() < 0.02, "{matter:?}: {integral}, {above}");
         }
     }
@@ -122,7 +132,7 @@ fn no_light_is_made() {
         let white = Matter { base: Vec3A::ONE, ..matter };
         for tilt in TILTS {
             for is_front in [true, false] {
-                let bsdf = Bsdf::of(&white, NORMAL, is_front, tilted(tilt));
+                let bsdf = of(&white, is_front, tilted(tilt));
                 let weights = grid(48).filter_map(|u| bsdf.sample(u)).map(|s| s.weight);
                 let mean = weights.sum::<Vec3A>() / 48f32.powi(3);
                 assert!(mean.max_element() < 1.01, "{white:?} {tilt} {is_front}: {mean}");
@@ -142,11 +152,31 @@ fn smooth_dielectrics_keep_all_light() {
     for matter in [white(1.0, true), white(1.0, false), white(0.0, false), white(0.5, true)] {
         for tilt in TILTS {
             for is_front in [true, false] {
-                let bsdf = Bsdf::of(&matter, NORMAL, is_front, tilted(tilt));
+                let bsdf = of(&matter, is_front, tilted(tilt));
                 let weights = grid(48).filter_map(|u| bsdf.sample(u)).map(|s| s.weight);
                 let mean = weights.sum::<Vec3A>() / 48f32.powi(3);
                 assert!((mean - 1.0).abs().max_element() < 0.01, "{matter:?} {tilt}: {mean}");
             }
+        }
+    }
+}
+
+/// What scatters evenly goes a shorter way: it must be what the longer one tends to.
+#[test]
+fn matte_is_what_hardly_glossy_is() {
+    let matte = Matter { specular: 0.0, ..plain(0.0, 1.0) };
+    let hardly = Matter { specular: 1e-6, ..matte.clone() };
+    for tilt in TILTS {
+        let [matte, hardly] = [&matte, &hardly].map(|matter| seen(matter, tilted(tilt)));
+        for direction in hemisphere(9).chain([-NORMAL]) {
+            let ((f, density), (g, other)) = (matte.towards(direction), hardly.towards(direction));
+            assert!(f.abs_diff_eq(g, 1e-4) && (density - other).abs() < 1e-4, "{direction}");
+        }
+        for numbers in grid(5) {
+            let found = matte.sample(numbers).expect("above");
+            assert_eq!(found.weight, BASE);
+            let density = matte.density(found.direction);
+            assert!((found.density.unwrap_or_default() - density).abs() < 1e-5, "{found:?}");
         }
     }
 }
@@ -171,11 +201,11 @@ fn light_goes_both_ways_alike() {
 #[test]
 fn a_mirror_reflects_its_colour_and_more_at_the_edge() {
     let mirror = seen(&plain(1.0, 0.0), tilted(0.4));
-    let scattered = mirror.sample([0.5; 3]).expect("above");
+    let scattered = mirror.sample([0.5; 2]).expect("above");
     assert!((scattered.direction.dot(NORMAL) - 0.4f32.cos()).abs() < 1e-5);
     assert!((scattered.weight - BASE).abs().max_element() < 1e-3);
     assert_eq!(mirror.scattered(scattered.direction), Vec3A::ZERO);
-    let edge = seen(&plain(1.0, 0.0), tilted(1.56)).sample([0.5; 3]).expect("above");
+    let edge = seen(&plain(1.0, 0.0), tilted(1.56)).sample([0.5; 2]).expect("above");
     assert!(edge.weight.min_element() > 0.9, "{edge:?}");
 }
 
@@ -195,7 +225,7 @@ fn nothing_absurd_makes_absurd_light() {
         };
         for is_front in [true, false] {
             let matter = with(plain(0.0, number), glass);
-            let bsdf = Bsdf::of(&matter, NORMAL, is_front, tilted(1.0));
+            let bsdf = of(&matter, is_front, tilted(1.0));
             for scattered in grid(12).filter_map(|u| bsdf.sample(u)) {
                 assert!(scattered.weight.is_finite(), "{matter:?} {scattered:?}");
                 assert!(scattered.direction.is_finite(), "{matter:?} {scattered:?}");
