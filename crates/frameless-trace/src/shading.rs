@@ -333,6 +333,15 @@ fn any_number_of_threads_gives_the_same_answers_in_order() {
         let sample = world.trace(&moment, &view, SIZE, request, &Settings::default());
         assert_eq!(sample, (one[5].rgb[k], one[5].surfaces[k]));
     }
+    // Paths as well.
+    let (there, path) = (
+        portable.moment(one[5].scene_secs),
+        Settings { integrator: Integrator::Path, ..Settings::default() },
+    );
+    for request in &one[5].requests {
+        let fast = world.trace(&moment, &view, SIZE, request, &path);
+        assert_eq!(fast, portable.trace(&there, &view, SIZE, request, &path));
+    }
 }
 
 #[test]
