@@ -198,7 +198,8 @@ mod tests {
     #[test]
     fn pairs_of_different_decisions_know_nothing_of_each_other() {
         let first = |numbers: Numbers, depth| numbers.at_surface(depth)[0];
-        let others: [(&str, fn(u32) -> [f32; 2]); 5] = [
+        type Pair = fn(u32) -> [f32; 2];
+        let others: [(&str, Pair); 5] = [
             ("light", |i| numbers(5, i).at_surface(1)[1]),
             ("next surface", |i| numbers(5, i).at_surface(2)[0]),
             ("sky", |i| numbers(5, i).sky(1)),
