@@ -1,7 +1,7 @@
 //! From triangles to a wide BVH.
 
 use frameless_scene::Mesh;
-use glam::{Vec3, Vec3A};
+use glam::{Affine3A, Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -11,6 +11,7 @@ use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::PlocBuilder;
 
 use crate::kernel::Pack;
+use crate::pages::prefer_large_pages;
 use crate::traverse::STACK_PER_TREE;
 use crate::wide::{Child, Node, collapse};
 
@@ -24,10 +25,10 @@ pub(crate) struct Blas {
 }
 
 impl Blas {
-    /// Triangles with a vertex that is not finite, or so far away that squares overflow, are left out: the builder
+    /// The mesh's triangles at a place. Those with a vertex that is not finite, or so far away that squares overflow, are left out: the builder
     /// panics on NaN. Triangles without area stay; no ray hits them.
-    pub(crate) fn new(mesh: &Mesh) -> Blas {
-        let corners = |primitive| corners(mesh, primitive);
+    pub(crate) fn new(mesh: &Mesh, place: &Affine3A) -> Blas {
+        let corners = |primitive| corners_at(place, mesh, primitive);
         let (primitives, boxes): (Vec<u32>, Vec<Aabb>) = (0..mesh.triangles.len() as u32)
             .filter_map(|primitive| Some((primitive, sane_box(&corners(primitive))?)))
             .unzip();
@@ -40,14 +41,20 @@ impl Blas {
         boxes: &[Aabb],
         corners: impl Fn(u32) -> [Vec3; 3],
     ) -> Blas {
-        let mut binary = binary_by_clustering(boxes, MOST_PER_LEAF);
+        let mut binary = binary_by_clustering(boxes);
         let mut blas = Blas { nodes: Vec::new(), packs: Vec::new(), bounds: union(boxes) };
         let needed = blas.take(&binary, primitives, &corners);
         if needed > STACK_PER_TREE {
             binary = binary_by_median(boxes);
             blas.take(&binary, primitives, &corners);
         }
+        blas.prefer_large_pages();
         blas
+    }
+
+    fn prefer_large_pages(&self) {
+        prefer_large_pages(&self.nodes);
+        prefer_large_pages(&self.packs);
     }
 
     fn take(
@@ -66,66 +73,20 @@ impl Blas {
     }
 }
 
-/// A tree over triangles of several instances; no pack has those of two.
-pub(crate) struct Tree {
-    pub(crate) blas: Blas,
-    /// Of each pack.
-    pub(crate) instance: Vec<u32>,
-}
-
-impl Tree {
-    /// `member`: instance and primitive of each box; `corners`: where that triangle is in the instance's coordinates.
-    pub(crate) fn over(
-        boxes: &[Aabb],
-        member: impl Fn(u32) -> (u32, u32),
-        corners: impl Fn(u32, u32) -> [Vec3; 3],
-    ) -> Tree {
-        // Leaves refer to at most four packs, and each triangle may be of another instance.
-        let mut binary = binary_by_clustering(boxes, 4);
-        let blas = Blas { nodes: Vec::new(), packs: Vec::new(), bounds: union(boxes) };
-        let mut tree = Tree { blas, instance: Vec::new() };
-        if tree.take(&binary, &member, &corners) > STACK_PER_TREE {
-            binary = binary_by_median(boxes);
-            tree.take(&binary, &member, &corners);
-        }
-        tree
-    }
-
-    fn take(
-        &mut self,
-        binary: &Bvh2,
-        member: &impl Fn(u32) -> (u32, u32),
-        corners: &impl Fn(u32, u32) -> [Vec3; 3],
-    ) -> usize {
-        let Tree { blas: Blas { nodes, packs, .. }, instance: instances } = self;
-        packs.clear();
-        instances.clear();
-        collapse(binary, nodes, |members| {
-            let first = packs.len();
-            let mut members: Vec<(u32, u32)> = members.iter().map(|&m| member(m)).collect();
-            members.sort_unstable();
-            for same in members.chunk_by(|a, b| a.0 == b.0) {
-                let instance = same[0].0;
-                let primitives: Vec<u32> = same.iter().map(|member| member.1).collect();
-                let all: Vec<u32> = (0..primitives.len() as u32).collect();
-                let there = |primitive| corners(instance, primitive);
-                packs.extend(all.chunks(4).map(|four| pack(&primitives, four, &there)));
-                instances.resize(packs.len(), instance);
-            }
-            Child::leaf(first, packs.len() - first)
-        })
-    }
-}
-
 /// A triangle's vertices.
 pub(crate) fn corners(mesh: &Mesh, primitive: u32) -> [Vec3; 3] {
     mesh.triangles[primitive as usize].map(|vertex| mesh.positions[vertex as usize])
 }
 
+/// The same where the mesh stands.
+pub(crate) fn corners_at(place: &Affine3A, mesh: &Mesh, primitive: u32) -> [Vec3; 3] {
+    corners(mesh, primitive).map(|corner| place.transform_point3(corner))
+}
+
 /// Products of two coordinates, and of three in the builder's areas, must stay below 3.4e38.
 pub(crate) const FARTHEST: f32 = 1e15;
 
-fn sane_box(corners: &[Vec3; 3]) -> Option<Aabb> {
+pub(crate) fn sane_box(corners: &[Vec3; 3]) -> Option<Aabb> {
     let sane = corners.iter().all(|c| c.is_finite() && c.abs().max_element() < FARTHEST);
     sane.then(|| Aabb::from_points(&corners.map(Vec3A::from)))
 }
@@ -153,7 +114,7 @@ const MOST_PER_LEAF: u32 = 8;
 
 /// Parallel locally-ordered clustering with reinsertion; `obvhs`' medium preset, step by step, since its helper
 /// validates the whole tree in debug builds.
-fn binary_by_clustering(boxes: &[Aabb], most_per_leaf: u32) -> Bvh2 {
+fn binary_by_clustering(boxes: &[Aabb]) -> Bvh2 {
     if boxes.len() <= 4 {
         return one_leaf(boxes);
     }
@@ -168,7 +129,7 @@ fn binary_by_clustering(boxes: &[Aabb], most_per_leaf: u32) -> Bvh2 {
     let mut optimizer = ReinsertionOptimizer::default();
     let ratio = preset.reinsertion_batch_ratio;
     optimizer.run(&mut binary, ratio, None);
-    leaf_collapser::collapse(&mut binary, most_per_leaf, preset.collapse_traversal_cost);
+    leaf_collapser::collapse(&mut binary, MOST_PER_LEAF, preset.collapse_traversal_cost);
     optimizer.run(
         &mut binary,
         ratio * preset.post_collapse_reinsertion_batch_ratio_multiplier,
@@ -239,7 +200,7 @@ mod tests {
     #[test]
     fn median_splits_never_need_more_stack_than_there_is() {
         let boxes = shrinking(390);
-        let clustered = stack_need(&binary_by_clustering(&boxes, MOST_PER_LEAF));
+        let clustered = stack_need(&binary_by_clustering(&boxes));
         assert!(clustered > STACK_PER_TREE, "{clustered}: the fallback would never be taken");
         let halved = stack_need(&binary_by_median(&boxes));
         assert!(halved <= 7 * 9, "{halved} for 390 boxes");

@@ -6,7 +6,12 @@
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx2;
 
+use std::ops::Range;
+
+use glam::Vec3A;
+
 use crate::ray::Ray;
+use crate::traverse::Entry;
 use crate::wide::Node;
 
 /// A box's far side counts as this much farther away, so that rounding never loses a box that the ray touches
@@ -22,7 +27,7 @@ pub(crate) enum Isa {
         allow(dead_code, reason = "the fallback, and the tests' reference")
     )]
     Portable,
-    /// x86-64 with AVX2 and BMI1, found at run time. Only [`Isa::detect`] makes it.
+    /// x86-64 with AVX2, BMI1 and POPCNT, found at run time. Only [`Isa::detect`] makes it.
     #[cfg(target_arch = "x86_64")]
     Avx2(avx2::Detected),
 }
@@ -40,10 +45,13 @@ impl Isa {
 
 /// The two tests. Implementors differ in speed only.
 pub(crate) trait Kernel {
-    /// Bit i: the ray meets box i at some t in [0, t_max]; and where it enters each.
-    fn boxes(node: &Node, ray: &SlabRay, t_max: f32) -> (u32, [f32; 8]);
+    /// Bit i: the ray meets box i at some t in [0, t_max]; and each child with where its box is entered.
+    fn boxes(node: &Node, ray: &SlabRay, t_max: f32) -> (u32, [Entry; 8]);
 
-    /// The triangles that the ray meets at 0 < t < t_max.
+    /// Asks for these items to be brought near the processor, if it can be asked.
+    fn fetch<T>(items: &[T], range: Range<usize>);
+
+    /// The triangles that the ray meets at 0 < t ≤ t_max < ∞.
     fn triangles(pack: &Pack, ray: &ShearRay, t_max: f32) -> Lanes;
 }
 
@@ -80,7 +88,7 @@ pub(crate) struct SlabRay {
 impl SlabRay {
     #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> SlabRay {
-        let reciprocal = ray.direction.to_array().map(|d| 1.0 / d);
+        let reciprocal = ray.direction.recip().to_array();
         SlabRay {
             origin: ray.origin.to_array(),
             reciprocal,
@@ -105,15 +113,12 @@ impl ShearRay {
     pub(crate) fn new(ray: &Ray) -> ShearRay {
         let d = ray.direction.to_array();
         let size = d.map(f32::abs);
-        let z = if size[0] > size[1] {
-            if size[0] > size[2] { 0 } else { 2 }
-        } else if size[1] > size[2] {
-            1
-        } else {
-            2
-        };
+        // Which it is cannot be predicted; so nothing branches on it.
+        let (x_or_y, larger) = if size[0] > size[1] { (0, size[0]) } else { (1, size[1]) };
+        let z = if larger > size[2] { x_or_y } else { 2 };
         let axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][z];
-        let shear = [d[axes[0]] / d[z], d[axes[1]] / d[z], 1.0 / d[z]];
+        let shear = Vec3A::new(d[axes[0]], d[axes[1]], 1.0) / d[z];
+        let shear = shear.to_array();
         ShearRay { origin: ray.origin.to_array(), axes, shear }
     }
 }
@@ -141,7 +146,7 @@ fn is_inside(u: f32, v: f32, w: f32) -> bool {
 
 impl Kernel for Portable {
     #[inline(always)]
-    fn boxes(node: &Node, ray: &SlabRay, t_max: f32) -> (u32, [f32; 8]) {
+    fn boxes(node: &Node, ray: &SlabRay, t_max: f32) -> (u32, [Entry; 8]) {
         let plane = |axis: usize, far: usize, lane: usize| {
             let side = node.bounds[2 * axis + (ray.entry[axis] ^ far)][lane];
             (side - ray.origin[axis]) * ray.reciprocal[axis]
@@ -158,8 +163,11 @@ impl Kernel for Portable {
         }
         let mask =
             (0..8).map(|lane| u32::from(near[lane] <= far[lane] * SLAB_MARGIN) << lane).sum();
-        (mask, near)
+        (mask, std::array::from_fn(|slot| Entry::new(node.child[slot], near[slot])))
     }
+
+    #[inline(always)]
+    fn fetch<T>(_items: &[T], _range: Range<usize>) {}
 
     /// With A, B, C the vertices in the ray's sheared space, seen along the ray:
     ///
@@ -196,7 +204,7 @@ impl Kernel for Portable {
             let determinant = u + v + w;
             let inverse = 1.0 / determinant;
             let t = (u * az + v * bz + w * cz) * inverse;
-            let hit = inside && determinant != 0.0 && t > 0.0 && t < t_max;
+            let hit = inside && determinant != 0.0 && t > 0.0 && t <= t_max;
             lanes.mask |= u32::from(hit) << lane;
             lanes.t[lane] = t;
             lanes.v[lane] = v * inverse;

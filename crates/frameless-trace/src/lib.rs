@@ -27,6 +27,7 @@ mod matter;
 mod moment;
 mod numbers;
 mod order;
+mod pages;
 mod patch;
 mod path;
 mod planes;

@@ -164,10 +164,11 @@ impl World {
         let (mut moved, geometries) = (false, &self.scene().geometries);
         for (index, instance) in self.scene().instances.iter().enumerate() {
             let world_from_object = self.scene().world_from_instance(index, &moment.state);
+            let stood = self.standing.as_ref().and_then(|standing| standing.place(index));
             match moment.placed.get_mut(index) {
                 Some(placed) if placed.world_from_object == world_from_object => continue,
                 Some(placed) => {
-                    *placed = Placed::new(world_from_object, placed.shape, placed.has_holes);
+                    *placed = Placed::new(world_from_object, stood, placed.shape, placed.has_holes);
                 }
                 None => {
                     let deformation = self.scene().deformation_of(index);
@@ -179,7 +180,7 @@ impl World {
                         (Geometry::Sphere { .. }, _) => Shape::Sphere,
                     };
                     let has_holes = self.holes[instance.geometry as usize];
-                    moment.placed.push(Placed::new(world_from_object, shape, has_holes));
+                    moment.placed.push(Placed::new(world_from_object, stood, shape, has_holes));
                 }
             }
             moved = true;

@@ -33,6 +33,32 @@ impl Ray {
     }
 }
 
+impl Hit {
+    /// Before anything is hit: every hit is before it.
+    pub(crate) const NONE: Hit =
+        Hit { t: f32::MAX, barycentric: [0.0; 2], primitive: u32::MAX, instance: u32::MAX };
+
+    /// Before anything is hit that counts only if its t is less than `t_max`.
+    #[inline(always)]
+    pub(crate) fn none_before(t_max: f32) -> Hit {
+        Hit { t: t_max.next_down(), ..Hit::NONE }
+    }
+
+    /// Whether this is found rather than `other`: the nearer, and of surfaces that coincide the first by instance and triangle, in
+    /// whichever order a walk meets them.
+    #[inline(always)]
+    pub(crate) fn is_before(&self, other: &Hit) -> bool {
+        let place = |hit: &Hit| u64::from(hit.instance) << 32 | u64::from(hit.primitive);
+        self.t < other.t || (self.t == other.t && place(self) < place(other))
+    }
+
+    /// `None` if nothing was hit.
+    #[inline(always)]
+    pub(crate) fn found(self) -> Option<Hit> {
+        (self.instance != Hit::NONE.instance).then_some(self)
+    }
+}
+
 /// The nearest intersection of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {

@@ -40,7 +40,7 @@ pub(crate) fn every_triangle(mesh: &Mesh, ray: &Ray) -> Vec<(u32, f32)> {
     let hits = (0..mesh.triangles.len() as u32).filter_map(|primitive| {
         let vertex = corners(mesh, primitive).map(|corner| corner.to_array().map(|c| [c; 4]));
         let pack = Pack { vertex, primitive: [primitive; 4] };
-        let lanes = Portable::triangles(&pack, &shear, f32::INFINITY);
+        let lanes = Portable::triangles(&pack, &shear, f32::MAX);
         (lanes.mask != 0).then_some((primitive, lanes.t[0]))
     });
     hits.collect()
@@ -236,7 +236,7 @@ fn a_closed_mesh_has_no_holes_at_shared_edges() {
     let world = one_mesh(mesh.clone());
     let mut rng = Rng::new(5);
     let mut rays = Vec::new();
-    for _ in 0..100_000 {
+    for _ in 0..1_000_000 {
         // From inside, at a point of an edge, or exactly at a vertex.
         let triangle = mesh.triangles[rng.below(mesh.triangles.len() as u32) as usize];
         let [a, b] = [0, 1].map(|k| mesh.positions[triangle[k] as usize]);
@@ -246,6 +246,26 @@ fn a_closed_mesh_has_no_holes_at_shared_edges() {
     }
     let misses = closest(&world, &rays).iter().filter(|hit| hit.is_none()).count();
     assert_eq!(misses, 0, "of {}", rays.len());
+}
+
+#[test]
+fn of_coinciding_surfaces_the_first_is_found() {
+    // Twice the same triangles in each of two meshes, of which one is shared by two instances at the same place.
+    let mut rng = Rng::new(12);
+    let mut mesh = random_soup(&mut rng, 50, 0.5);
+    mesh.triangles.extend(mesh.triangles.clone());
+    mesh.triangle_materials.resize(mesh.triangles.len(), 0);
+    let mut scene = scenes::empty();
+    scenes::add(&mut scene, Geometry::Mesh(mesh.clone()), Transform::IDENTITY);
+    scenes::add(&mut scene, Geometry::Mesh(mesh), Transform::IDENTITY);
+    let second = scene.instances[1];
+    scene.instances.push(second);
+    let found = closest(&World::new(Arc::new(scene)), &random_rays(&mut rng, 3_000));
+    let hits: Vec<Hit> = found.into_iter().flatten().collect();
+    assert!(hits.len() > 100, "{}", hits.len());
+    for hit in hits {
+        assert!(hit.instance == 0 && hit.primitive < 50, "{hit:?}");
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use glam::Vec3A;
 
 use crate::ray::Ray;
 
-/// The first t in (0, t_max) at which the ray is on the sphere, from outside or inside.
+/// The first t in (0, t_max] at which the ray is on the sphere, from outside or inside.
 ///
 /// With f = o, a = d·d, b' = −f·d, c = f·f − 1: Δ = 1 − |f + (b'/a)·d|², q = b' + sign(b')·√(a·Δ), and the roots are c/q and
 /// q/a. Neither subtracts nearly equal numbers, even where the sphere is small and far away (Haines, Günther &
@@ -25,9 +25,9 @@ pub(crate) fn intersect(ray: &Ray, t_max: f32) -> Option<f32> {
     let (t0, t1) = (c / q, q / a);
     let (near, far) = if t0 < t1 { (t0, t1) } else { (t1, t0) };
     if near > 0.0 {
-        (near < t_max).then_some(near)
+        (near <= t_max).then_some(near)
     } else {
-        (far > 0.0 && far < t_max).then_some(far)
+        (far > 0.0 && far <= t_max).then_some(far)
     }
 }
 
@@ -57,10 +57,11 @@ mod tests {
         assert_eq!(intersect(&ray([0.0, 0.0, 3.0], [0.0, 0.0, 1.0]), 9.0), None, "behind");
         assert_eq!(
             intersect(&ray([0.0, 0.0, 3.0], [0.0, 0.0, -1.0]), 2.0),
-            None,
-            "t_max is excluded"
+            Some(2.0),
+            "t_max is included"
         );
         assert_eq!(intersect(&ray([0.0; 3], [0.0, 1.0, 0.0]), 9.0), Some(1.0), "from inside");
+        assert_eq!(intersect(&ray([0.0, 0.0, 3.0], [0.0, 0.0, -1.0]), 1.999), None, "too far");
         assert_eq!(intersect(&ray([0.0, 1.5, 3.0], [0.0, 0.0, -1.0]), 9.0), None, "beside");
         assert_eq!(intersect(&ray([0.0; 3], [0.0; 3]), 9.0), None, "no direction");
         // 0.6² + 0.8² = 1: beside the centre the surface is at z = ±0.8.
@@ -75,7 +76,7 @@ mod tests {
     #[test]
     fn precise_from_far_away() {
         // The textbook's b² − 4ac loses everything here: 1e10 ± 1 in single precision.
-        let t = intersect(&ray([0.0, 0.5, 1e5], [0.0, 0.0, -1.0]), f32::INFINITY).unwrap();
+        let t = intersect(&ray([0.0, 0.5, 1e5], [0.0, 0.0, -1.0]), f32::MAX).unwrap();
         let exact = 1e5 - 0.75f64.sqrt();
         assert!((f64::from(t) - exact).abs() < 0.01, "{t} is not {exact}");
     }

@@ -1,66 +1,80 @@
 //! One tree over the triangles of all instances that stand still, instead of one per instance below another over the instances: where
 //! their boxes overlap, as those of furniture and the room around it do, a ray would walk each of them from its root.
 //!
-//! The boxes are the world's; the triangles stay in their instances' coordinates, into which the ray is taken where a leaf is met, so that
-//! every test is the one of two levels, bit for bit. Boxes are wider than their triangles by what rounding on that way can amount to.
+//! The triangles are where they stand in the world, so that a ray is taken nowhere. Should one of the instances be moved all the same (see
+//! [`World::update_moment_with`]), that moment is walked on two levels, with a tree per instance over the same triangles, in the
+//! coordinates that the world had for them: what has not moved is hit as before, to the last bit.
 //!
-//! Which instances stand still is known by the animation. Should one be moved all the same (see [`World::update_moment_with`]), that moment
-//! is walked on two levels.
+//! Which instances stand still is known by the animation.
 //!
 //! [`World::update_moment_with`]: crate::world::World::update_moment_with
 
-use frameless_scene::{Geometry, Instance, Mesh, Scene, Target};
-use glam::{Affine3A, Vec3A};
-use obvhs::aabb::Aabb;
+use std::marker::PhantomData;
 
-use crate::build::{Blas, FARTHEST, Tree, corners};
+use frameless_scene::{Geometry, Instance, Mesh, Scene, Target};
+use glam::{Affine3A, Vec3};
+
+use crate::build::{Blas, corners_at, sane_box};
 use crate::kernel::{Kernel, ShearRay, SlabRay};
+use crate::pages::prefer_large_pages;
 use crate::ray::{Hit, Ray};
-use crate::sift::Sieve;
-use crate::top::{NOTHING, Placed};
+use crate::sift::Stops;
+use crate::top::{Placed, first_of, take};
 use crate::traverse::{Leaves, Stack, walk};
 use crate::wide::Child;
 
-/// The instances that stand still, if there are several, and their tree.
+/// The instances that stand still, if there are any, and their tree.
 pub(crate) struct Standing {
+    /// Its primitives are indices of `members`.
     tree: Blas,
-    /// Of each pack of the tree.
-    instance: Vec<u32>,
+    members: Vec<Member>,
     /// Where each instance of the scene stands; `None`: it is not in the tree.
     places: Vec<Option<Affine3A>>,
 }
 
-/// Of what the largest coordinate is: 64 roundings, as for [`crate::point`]'s way to the world and back.
-const PADDING: f32 = 64.0 * f32::EPSILON;
+/// A triangle of an instance.
+#[derive(Clone, Copy)]
+struct Member {
+    instance: u32,
+    primitive: u32,
+}
 
 impl Standing {
-    /// `None` where a tree of its own for every instance does as well: there is but one, or none.
+    /// `None` if nothing stands.
     pub(crate) fn new(scene: &Scene) -> Option<Standing> {
         let places = places(scene);
-        if places.iter().flatten().count() < 2 {
-            return None;
-        }
-        let mut members = Vec::new();
-        let mut boxes = Vec::new();
-        for (instance, place) in places.iter().enumerate() {
-            let (Some(place), Some(mesh)) = (place, mesh_of(scene, instance)) else { continue };
+        let standing = |instance: u32| {
+            let mesh = mesh_of(scene, instance as usize)?;
+            Some((places[instance as usize].as_ref()?, mesh))
+        };
+        let (mut members, mut boxes) = (Vec::new(), Vec::new());
+        for instance in 0..scene.instances.len() as u32 {
+            let Some((place, mesh)) = standing(instance) else { continue };
             for primitive in 0..mesh.triangles.len() as u32 {
-                if let Some(bounds) = world_box(place, mesh, primitive) {
-                    members.push((instance as u32, primitive));
+                if let Some(bounds) = sane_box(&corners_at(place, mesh, primitive)) {
+                    members.push(Member { instance, primitive });
                     boxes.push(bounds);
                 }
             }
         }
-        let farthest = boxes.iter().map(|b| b.min.abs().max(b.max.abs()).max_element());
-        let padding = Vec3A::splat(PADDING * farthest.fold(0.0, f32::max));
-        boxes.iter_mut().for_each(|b| *b = Aabb::new(b.min - padding, b.max + padding));
-        let place = |member: u32| members[member as usize];
-        let corners = |instance: u32, primitive: u32| {
-            mesh_of(scene, instance as usize)
-                .map_or([glam::Vec3::ZERO; 3], |m| corners(m, primitive))
+        if places.iter().all(Option::is_none) {
+            return None;
+        }
+        let corners = |member: u32| {
+            let Member { instance, primitive } = members[member as usize];
+            standing(instance)
+                .map_or([Vec3::ZERO; 3], |(place, mesh)| corners_at(place, mesh, primitive))
         };
-        let Tree { blas, instance } = Tree::over(&boxes, place, corners);
-        Some(Standing { tree: blas, instance, places })
+        let all: Vec<u32> = (0..members.len() as u32).collect();
+        let tree = Blas::over(&all, &boxes, corners);
+        prefer_large_pages(&members);
+        Some(Standing { tree, members, places })
+    }
+
+    /// Where an instance of the tree stands.
+    #[inline]
+    pub(crate) fn place(&self, instance: usize) -> Option<&Affine3A> {
+        self.places[instance].as_ref()
     }
 
     /// Whether the tree has this instance.
@@ -75,50 +89,19 @@ impl Standing {
         all.all(|(place, placed)| place.is_none_or(|place| place == placed.world_from_object))
     }
 
-    /// The nearest hit before `t_max`, which becomes its t; with `ANY`, any.
+    /// Whether anything is hit before `best`, which becomes the nearest hit; with `ANY`, whichever is found first.
     #[inline(always)]
-    pub(crate) fn walk<K: Kernel, const ANY: bool>(
+    pub(crate) fn walk<K: Kernel, S: Stops, const ANY: bool>(
         &self,
         placed: &[Placed],
-        ray: &Ray,
-        t_max: &mut f32,
+        (ray, slab): (&Ray, &SlabRay),
+        best: &mut Hit,
+        sieve: &mut S,
         stack: &mut Stack,
-    ) -> Option<Hit> {
-        let mut leaves = Packs::<K, ANY, NoSieve> {
-            standing: self,
-            placed,
-            ray,
-            local: None,
-            hit: NOTHING,
-            sieve: NoSieve,
-            kernel: Default::default(),
-        };
-        walk::<K, ANY>(&self.tree.nodes, &SlabRay::new(ray), t_max, stack, &mut leaves)
-            .then_some(leaves.hit)
-    }
-
-    /// The same of hits that `sieve` stops.
-    #[inline(always)]
-    pub(crate) fn sift<K: Kernel, const ANY: bool>(
-        &self,
-        placed: &[Placed],
-        ray: &Ray,
-        t_max: &mut f32,
-        sieve: &mut dyn Sieve,
-        stack: &mut Stack,
-    ) -> Option<Hit> {
-        let is_for_all = sieve.is_for_all();
-        let mut leaves = Packs::<K, ANY, _> {
-            standing: self,
-            placed,
-            ray,
-            local: None,
-            hit: NOTHING,
-            sieve: Asks { sieve, is_for_all },
-            kernel: Default::default(),
-        };
-        walk::<K, ANY>(&self.tree.nodes, &SlabRay::new(ray), t_max, stack, &mut leaves)
-            .then_some(leaves.hit)
+    ) -> bool {
+        let (ray, kernel) = (ShearRay::new(ray), PhantomData);
+        let mut leaves = Packs::<K, S, ANY> { standing: self, placed, ray, sieve, kernel };
+        walk::<K, ANY>(&self.tree.nodes, slab, best, stack, &mut leaves)
     }
 }
 
@@ -167,117 +150,42 @@ fn mesh_of(scene: &Scene, instance: usize) -> Option<&Mesh> {
     }
 }
 
-/// `None` of what cannot be hit.
-fn world_box(place: &Affine3A, mesh: &Mesh, primitive: u32) -> Option<Aabb> {
-    let local = corners(mesh, primitive).map(Vec3A::from);
-    let there = local.map(|corner| place.transform_point3a(corner));
-    let is_sane = |c: &Vec3A| c.is_finite() && c.abs().max_element() < FARTHEST;
-    (local.iter().chain(&there).all(is_sane)).then(|| Aabb::from_points(&there))
-}
-
-/// Whether a hit is one.
-trait Stops {
-    fn stops(&mut self, placed: &Placed, hit: &Hit) -> bool;
-    /// Whether hits of this instance have to be asked about one by one, the repeated lanes left out.
-    fn asks(&self, placed: &Placed) -> bool;
-}
-
-struct NoSieve;
-
-impl Stops for NoSieve {
-    #[inline(always)]
-    fn stops(&mut self, _placed: &Placed, _hit: &Hit) -> bool {
-        true
-    }
-
-    #[inline(always)]
-    fn asks(&self, _placed: &Placed) -> bool {
-        false
-    }
-}
-
-struct Asks<'s> {
-    sieve: &'s mut dyn Sieve,
-    is_for_all: bool,
-}
-
-impl Stops for Asks<'_> {
-    fn stops(&mut self, placed: &Placed, hit: &Hit) -> bool {
-        !self.asks(placed) || self.sieve.stops(hit)
-    }
-
-    fn asks(&self, placed: &Placed) -> bool {
-        self.is_for_all || placed.has_holes
-    }
-}
-
-/// The leaves: packs of triangles of one instance each.
-struct Packs<'a, K, const ANY: bool, S> {
+/// The leaves.
+struct Packs<'a, K, S, const ANY: bool> {
     standing: &'a Standing,
     placed: &'a [Placed],
-    ray: &'a Ray,
-    /// The ray in the coordinates of the instance met last; `None` in it where those have no room for it.
-    local: Option<(u32, Option<ShearRay>)>,
-    hit: Hit,
-    sieve: S,
-    kernel: std::marker::PhantomData<K>,
+    ray: ShearRay,
+    sieve: &'a mut S,
+    kernel: PhantomData<K>,
 }
 
-impl<K: Kernel, const ANY: bool, S: Stops> Packs<'_, K, ANY, S> {
+impl<K: Kernel, S: Stops, const ANY: bool> Leaves for Packs<'_, K, S, ANY> {
     #[inline(always)]
-    fn ray_in(&mut self, instance: u32) -> Option<ShearRay> {
-        match self.local {
-            Some((last, ray)) if last == instance => ray,
-            _ => {
-                let to_object = &self.placed[instance as usize].object_from_world;
-                // Not normalised, so that t means the same here and in the world.
-                let ray = self.ray.transformed(to_object);
-                let ray = ray.is_traceable().then(|| ShearRay::new(&ray));
-                self.local = Some((instance, ray));
-                ray
-            }
-        }
+    fn fetch(&self, leaf: Child) {
+        K::fetch(&self.standing.tree.packs, first_of(leaf));
     }
-}
 
-impl<K: Kernel, const ANY: bool, S: Stops> Leaves for Packs<'_, K, ANY, S> {
     #[inline(always)]
-    fn visit(&mut self, leaf: Child, t_max: &mut f32, _stack: &mut Stack) -> bool {
+    fn visit(&mut self, leaf: Child, best: &mut Hit, _stack: &mut Stack) -> bool {
         let mut found = false;
-        for index in leaf.items() {
-            let instance = self.standing.instance[index];
-            let Some(ray) = self.ray_in(instance) else { continue };
-            let pack = &self.standing.tree.packs[index];
-            let lanes = K::triangles(pack, &ray, *t_max);
+        for pack in &self.standing.tree.packs[leaf.items()] {
+            let lanes = K::triangles(pack, &self.ray, best.t);
             if lanes.mask == 0 {
                 continue;
             }
-            let placed = &self.placed[instance as usize];
-            let asks = self.sieve.asks(placed);
-            if ANY && !asks {
+            let Packs { standing, placed, sieve, .. } = self;
+            found |= take::<ANY>(
+                pack,
+                &lanes,
+                best,
+                |member| {
+                    let Member { instance, primitive } = standing.members[member as usize];
+                    (instance, primitive)
+                },
+                |hit| !sieve.asks(&placed[hit.instance as usize]) || sieve.stops(hit),
+            );
+            if ANY && found {
                 return true;
-            }
-            for lane in 0..4 {
-                // Unused lanes repeat the last used one, which is to be asked about once.
-                let repeats = asks && lane > 0 && pack.primitive[lane] == pack.primitive[lane - 1];
-                if lanes.mask >> lane & 1 == 0 || repeats || lanes.t[lane] >= *t_max {
-                    continue;
-                }
-                let hit = Hit {
-                    t: lanes.t[lane],
-                    barycentric: [lanes.v[lane], lanes.w[lane]],
-                    primitive: pack.primitive[lane],
-                    instance,
-                };
-                if !self.sieve.stops(placed, &hit) {
-                    continue;
-                }
-                self.hit = hit;
-                if ANY {
-                    return true;
-                }
-                *t_max = hit.t;
-                found = true;
             }
         }
         found

@@ -1,5 +1,7 @@
 //! Two levels: a tree over the instances, and in each instance's own space its mesh's tree or a sphere.
 
+use std::marker::PhantomData;
+use std::ops::Range;
 use std::sync::OnceLock;
 
 use glam::{Affine3A, Vec3A};
@@ -11,8 +13,9 @@ use crate::build::{Blas, binary_by_median};
 use crate::deforming::Deforming;
 #[cfg(target_arch = "x86_64")]
 use crate::kernel::avx2;
-use crate::kernel::{Isa, Kernel, Portable, ShearRay, SlabRay};
+use crate::kernel::{Isa, Kernel, Lanes, Pack, Portable, ShearRay, SlabRay};
 use crate::ray::{Hit, Ray};
+use crate::sift::{NoSieve, Stops};
 use crate::sphere;
 use crate::standing::Standing;
 use crate::traverse::{Leaves, STACK_PER_TREE, Stack, walk};
@@ -55,15 +58,37 @@ impl<'a> Trees<'a> {
 pub(crate) struct Placed {
     pub(crate) world_from_object: Affine3A,
     pub(crate) object_from_world: Affine3A,
+    /// From the world to the coordinates of its tree: the object's, or, of what stood still when the tree was made, the world's then.
+    tree_from_world: Affine3A,
+    world_from_tree: Affine3A,
     pub(crate) shape: Shape,
     /// Whether rays may pass some of its triangles.
     pub(crate) has_holes: bool,
 }
 
 impl Placed {
-    pub(crate) fn new(world_from_object: Affine3A, shape: Shape, has_holes: bool) -> Placed {
+    /// `stood`: where it stood when its tree was made, if it did.
+    pub(crate) fn new(
+        world_from_object: Affine3A,
+        stood: Option<&Affine3A>,
+        shape: Shape,
+        has_holes: bool,
+    ) -> Placed {
         let object_from_world = world_from_object.inverse();
-        Placed { world_from_object, object_from_world, shape, has_holes }
+        let (tree_from_world, world_from_tree) = match stood {
+            None => (object_from_world, world_from_object),
+            // Where it still stands a ray is in the tree what it is in the world, to the last bit.
+            Some(stood) if *stood == world_from_object => (Affine3A::IDENTITY, Affine3A::IDENTITY),
+            Some(stood) => (*stood * object_from_world, world_from_object * stood.inverse()),
+        };
+        Placed {
+            world_from_object,
+            object_from_world,
+            tree_from_world,
+            world_from_tree,
+            shape,
+            has_holes,
+        }
     }
 
     /// World box; `None` where nothing can be hit: no triangles, or a transform without an inverse (a scale of zero).
@@ -77,7 +102,7 @@ impl Placed {
         if !invertible || self.world_from_object.matrix3.determinant() == 0.0 {
             return None;
         }
-        let m = &self.world_from_object;
+        let m = &self.world_from_tree;
         let centre = m.transform_point3a(0.5 * (low + high));
         let half = match self.shape {
             // The farthest point of an ellipsoid along an axis is that row of the matrix long.
@@ -177,175 +202,201 @@ impl Targets<'_> {
     /// The nearest hit at 0 < t < ∞.
     #[inline]
     pub(crate) fn closest(&self, ray: &Ray, stack: &mut Stack) -> Option<Hit> {
-        match self.isa {
-            Isa::Portable => self.closest_with::<Portable>(ray, stack),
-            #[cfg(target_arch = "x86_64")]
-            Isa::Avx2(proof) => avx2::with(proof, Closest { targets: self, ray, stack }),
-        }
+        self.find::<false, _>(ray, Hit::NONE, NoSieve, stack)
     }
 
     /// Whether anything is hit at 0 < t < t_max.
     #[inline]
     pub(crate) fn occluded(&self, ray: &Ray, t_max: f32, stack: &mut Stack) -> bool {
-        match self.isa {
-            Isa::Portable => self.occluded_with::<Portable>(ray, t_max, stack),
-            #[cfg(target_arch = "x86_64")]
-            Isa::Avx2(proof) => avx2::with(proof, Occluded { targets: self, ray, t_max, stack }),
-        }
+        self.find::<true, _>(ray, Hit::none_before(t_max), NoSieve, stack).is_some()
     }
 
+    /// The nearest hit before `none` that the sieve stops; with `ANY`, whichever is found first.
     #[inline(always)]
-    fn closest_with<K: Kernel>(&self, ray: &Ray, stack: &mut Stack) -> Option<Hit> {
-        let mut t_max = f32::INFINITY;
-        self.walk::<K, false>(ray, &mut t_max, stack)
-    }
-
-    #[inline(always)]
-    fn occluded_with<K: Kernel>(&self, ray: &Ray, mut t_max: f32, stack: &mut Stack) -> bool {
-        self.walk::<K, true>(ray, &mut t_max, stack).is_some()
-    }
-
-    #[inline(always)]
-    fn walk<K: Kernel, const ANY: bool>(
+    pub(crate) fn find<const ANY: bool, S: Stops>(
         &self,
         ray: &Ray,
-        t_max: &mut f32,
+        none: Hit,
+        sieve: S,
         stack: &mut Stack,
     ) -> Option<Hit> {
-        if !ray.is_traceable() {
-            return None;
+        let walk = Walk::<S, ANY> { targets: self, ray, none, sieve, stack };
+        match self.isa {
+            Isa::Portable => walk.with::<Portable>(),
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx2(proof) => avx2::with(proof, walk),
         }
-        let hit = self
-            .standing
-            .and_then(|standing| standing.walk::<K, ANY>(self.placed, ray, t_max, stack));
-        if self.top.leaves.is_empty() || (ANY && hit.is_some()) {
-            return hit;
-        }
-        let mut instances =
-            Instances::<K, ANY> { targets: self, ray, hit: NOTHING, kernel: Default::default() };
-        let slab = SlabRay::new(ray);
-        walk::<K, ANY>(&self.top.nodes, &slab, t_max, stack, &mut instances)
-            .then_some(instances.hit)
-            .or(hit)
     }
 }
 
-/// Before anything is hit.
-pub(crate) const NOTHING: Hit = Hit { t: 0.0, barycentric: [0.0; 2], primitive: 0, instance: 0 };
-
-#[cfg(target_arch = "x86_64")]
-struct Closest<'a> {
+/// A ray's way through everything.
+struct Walk<'a, S, const ANY: bool> {
     targets: &'a Targets<'a>,
     ray: &'a Ray,
+    /// What a hit must be before.
+    none: Hit,
+    sieve: S,
     stack: &'a mut Stack,
 }
 
 #[cfg(target_arch = "x86_64")]
-impl avx2::Task for Closest<'_> {
+impl<S: Stops, const ANY: bool> avx2::Task for Walk<'_, S, ANY> {
     type Output = Option<Hit>;
     #[inline(always)]
     fn run(self) -> Option<Hit> {
-        self.targets.closest_with::<avx2::Avx2>(self.ray, self.stack)
+        self.with::<avx2::Avx2>()
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-struct Occluded<'a> {
-    targets: &'a Targets<'a>,
-    ray: &'a Ray,
-    t_max: f32,
-    stack: &'a mut Stack,
-}
-
-#[cfg(target_arch = "x86_64")]
-impl avx2::Task for Occluded<'_> {
-    type Output = bool;
+impl<S: Stops, const ANY: bool> Walk<'_, S, ANY> {
     #[inline(always)]
-    fn run(self) -> bool {
-        self.targets.occluded_with::<avx2::Avx2>(self.ray, self.t_max, self.stack)
+    fn with<K: Kernel>(self) -> Option<Hit> {
+        let Walk { targets, ray, none: mut best, mut sieve, stack } = self;
+        if !ray.is_traceable() {
+            return None;
+        }
+        let slab = SlabRay::new(ray);
+        if let Some(standing) = targets.standing {
+            let way = (ray, &slab);
+            let found =
+                standing.walk::<K, S, ANY>(targets.placed, way, &mut best, &mut sieve, stack);
+            if ANY && found {
+                return Some(best);
+            }
+        }
+        if !targets.top.leaves.is_empty() {
+            let mut instances = Instances::<K, S, ANY> { targets, ray, sieve, kernel: PhantomData };
+            walk::<K, ANY>(&targets.top.nodes, &slab, &mut best, stack, &mut instances);
+        }
+        best.found()
     }
 }
 
 /// The top level's leaves.
-struct Instances<'a, K, const ANY: bool> {
+struct Instances<'a, K, S, const ANY: bool> {
     targets: &'a Targets<'a>,
     ray: &'a Ray,
-    hit: Hit,
-    kernel: std::marker::PhantomData<K>,
+    sieve: S,
+    kernel: PhantomData<K>,
 }
 
-impl<K: Kernel, const ANY: bool> Leaves for Instances<'_, K, ANY> {
+impl<K: Kernel, S: Stops, const ANY: bool> Leaves for Instances<'_, K, S, ANY> {
     #[inline(always)]
-    fn visit(&mut self, leaf: Child, t_max: &mut f32, stack: &mut Stack) -> bool {
+    fn fetch(&self, _leaf: Child) {}
+
+    #[inline(always)]
+    fn visit(&mut self, leaf: Child, best: &mut Hit, stack: &mut Stack) -> bool {
         let mut found = false;
         for &instance in &self.targets.top.leaves[leaf.items()] {
             let placed = &self.targets.placed[instance as usize];
             // Not normalised, so that t means the same here and in the world.
-            let local = self.ray.transformed(&placed.object_from_world);
-            let hit = match self.targets.trees.of(placed.shape) {
-                None => sphere::intersect(&local, *t_max).map(|t| {
-                    *t_max = t;
-                    Hit { t, barycentric: [0.0; 2], primitive: 0, instance }
-                }),
-                Some(blas) => in_mesh::<K, ANY>(blas, &local, instance, t_max, stack),
-            };
-            if let Some(hit) = hit {
-                self.hit = hit;
-                found = true;
-                if ANY {
-                    return true;
+            let ray = self.ray.transformed(&placed.tree_from_world);
+            found |= match self.targets.trees.of(placed.shape) {
+                None => meet_sphere(&ray, instance, best),
+                Some(blas) if ray.is_traceable() => {
+                    let asks = self.sieve.asks(placed);
+                    let (shear, sieve) = (ShearRay::new(&ray), &mut self.sieve);
+                    let mut triangles = Triangles::<K, S, ANY> {
+                        packs: &blas.packs,
+                        ray: shear,
+                        instance,
+                        asks,
+                        sieve,
+                        kernel: PhantomData,
+                    };
+                    walk::<K, ANY>(&blas.nodes, &SlabRay::new(&ray), best, stack, &mut triangles)
                 }
+                Some(_) => false,
+            };
+            if ANY && found {
+                return true;
             }
         }
         found
     }
 }
 
+/// Spheres have no holes and no backs: no sieve is asked.
 #[inline(always)]
-pub(crate) fn in_mesh<K: Kernel, const ANY: bool>(
-    blas: &Blas,
-    ray: &Ray,
-    instance: u32,
-    t_max: &mut f32,
-    stack: &mut Stack,
-) -> Option<Hit> {
-    if !ray.is_traceable() {
-        return None;
-    }
-    let hit = Hit { t: 0.0, barycentric: [0.0; 2], primitive: 0, instance };
-    let shear = ShearRay::new(ray);
-    let mut triangles = Triangles::<K, ANY> { blas, ray: shear, hit, kernel: Default::default() };
-    walk::<K, ANY>(&blas.nodes, &SlabRay::new(ray), t_max, stack, &mut triangles)
-        .then_some(triangles.hit)
+fn meet_sphere(ray: &Ray, instance: u32, best: &mut Hit) -> bool {
+    let hit = sphere::intersect(ray, best.t)
+        .map(|t| Hit { t, barycentric: [0.0; 2], primitive: 0, instance })
+        .filter(|hit| hit.is_before(best));
+    *best = hit.unwrap_or(*best);
+    hit.is_some()
 }
 
 /// The bottom level's leaves.
-struct Triangles<'a, K, const ANY: bool> {
-    blas: &'a Blas,
+struct Triangles<'a, K, S, const ANY: bool> {
+    packs: &'a [Pack],
     ray: ShearRay,
-    hit: Hit,
-    kernel: std::marker::PhantomData<K>,
+    instance: u32,
+    asks: bool,
+    sieve: &'a mut S,
+    kernel: PhantomData<K>,
 }
 
-impl<K: Kernel, const ANY: bool> Leaves for Triangles<'_, K, ANY> {
+impl<K: Kernel, S: Stops, const ANY: bool> Leaves for Triangles<'_, K, S, ANY> {
     #[inline(always)]
-    fn visit(&mut self, leaf: Child, t_max: &mut f32, _stack: &mut Stack) -> bool {
+    fn fetch(&self, leaf: Child) {
+        K::fetch(self.packs, first_of(leaf));
+    }
+
+    #[inline(always)]
+    fn visit(&mut self, leaf: Child, best: &mut Hit, _stack: &mut Stack) -> bool {
         let mut found = false;
-        for pack in &self.blas.packs[leaf.items()] {
-            let lanes = K::triangles(pack, &self.ray, *t_max);
-            if ANY && lanes.mask != 0 {
-                return true;
+        for pack in &self.packs[leaf.items()] {
+            let lanes = K::triangles(pack, &self.ray, best.t);
+            if lanes.mask == 0 {
+                continue;
             }
-            for lane in 0..4 {
-                if lanes.mask >> lane & 1 != 0 && lanes.t[lane] < *t_max {
-                    *t_max = lanes.t[lane];
-                    self.hit.t = lanes.t[lane];
-                    self.hit.barycentric = [lanes.v[lane], lanes.w[lane]];
-                    self.hit.primitive = pack.primitive[lane];
-                    found = true;
-                }
+            let (instance, asks) = (self.instance, self.asks);
+            let place = |primitive| (instance, primitive);
+            found |= take::<ANY>(pack, &lanes, best, place, |hit| !asks || self.sieve.stops(hit));
+            if ANY && found {
+                return true;
             }
         }
         found
     }
+}
+
+/// A leaf's first item: the others are mostly not there, or follow by themselves.
+#[inline(always)]
+pub(crate) fn first_of(leaf: Child) -> Range<usize> {
+    let first = leaf.items().start;
+    first..first + 1
+}
+
+/// Takes the best of a pack's hits, of those that `stops` says are hits. Whether there was one. `place`: instance and triangle of what is in
+/// the pack.
+#[inline(always)]
+pub(crate) fn take<const ANY: bool>(
+    pack: &Pack,
+    lanes: &Lanes,
+    best: &mut Hit,
+    place: impl Fn(u32) -> (u32, u32),
+    mut stops: impl FnMut(&Hit) -> bool,
+) -> bool {
+    let (mut found, mut last) = (false, None);
+    let mut mask = lanes.mask;
+    while mask != 0 {
+        let lane = mask.trailing_zeros() as usize & 3;
+        mask &= mask - 1;
+        // Unused lanes repeat the last used one, which is to be asked about once.
+        if last.replace(pack.primitive[lane]) == Some(pack.primitive[lane]) {
+            continue;
+        }
+        let (instance, primitive) = place(pack.primitive[lane]);
+        let barycentric = [lanes.v[lane], lanes.w[lane]];
+        let hit = Hit { t: lanes.t[lane], barycentric, primitive, instance };
+        if hit.is_before(best) && stops(&hit) {
+            *best = hit;
+            found = true;
+            if ANY {
+                break;
+            }
+        }
+    }
+    found
 }

@@ -1,60 +1,94 @@
 //! The walk through a wide BVH, nearest box first.
 
 use crate::kernel::{Kernel, SLAB_MARGIN, SlabRay};
+use crate::ray::Hit;
 use crate::wide::{Child, Node};
 
 /// Entries that one tree's traversal may put on the stack. A tree balanced by median splits of 2²⁹ leaves needs
 /// 7 per binary level: 7 · 27 = 189.
 pub(crate) const STACK_PER_TREE: usize = 192;
 
+/// Room for two trees, and a power of two, so that an index can be kept inside without asking.
+const ENTRIES: usize = (2 * STACK_PER_TREE).next_power_of_two();
+
 /// Nodes still to be visited: the top level's and, above them, one instance's.
 pub(crate) struct Stack {
-    entries: [(Child, f32); 2 * STACK_PER_TREE],
+    entries: [Entry; ENTRIES],
     length: usize,
+}
+
+/// A node and where the ray enters it, in one number that is larger the farther away that is: bits of floats that are not negative
+/// are in the order of the floats.
+#[repr(transparent)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Entry(u64);
+
+impl Entry {
+    /// Where a walk begins.
+    pub(crate) const ROOT: Entry = Entry(0);
+
+    #[inline(always)]
+    pub(crate) fn new(child: Child, near: f32) -> Entry {
+        Entry(u64::from(near.to_bits()) << 32 | u64::from(child.bits()))
+    }
+
+    #[inline(always)]
+    fn child(self) -> Child {
+        Child::from_bits(self.0 as u32)
+    }
+
+    #[inline(always)]
+    fn near(self) -> f32 {
+        f32::from_bits((self.0 >> 32) as u32)
+    }
 }
 
 impl Stack {
     pub(crate) fn new() -> Stack {
-        Stack { entries: [(Child::ROOT, 0.0); 2 * STACK_PER_TREE], length: 0 }
+        Stack { entries: [Entry::ROOT; ENTRIES], length: 0 }
     }
 
     #[inline(always)]
-    fn push(&mut self, child: Child, near: f32) {
-        self.entries[self.length] = (child, near);
+    fn push(&mut self, entry: Entry) {
+        debug_assert!(self.length < ENTRIES, "the builder keeps trees within STACK_PER_TREE");
+        self.entries[self.length % ENTRIES] = entry;
         self.length += 1;
     }
 
-    /// Insert so that entries from `base` on stay sorted, the nearest on top.
     #[inline(always)]
-    fn insert(&mut self, base: usize, child: Child, near: f32) {
+    fn pop(&mut self) -> Entry {
+        self.length -= 1;
+        self.entries[self.length % ENTRIES]
+    }
+
+    /// Puts an entry where those from `base` on stay sorted, the nearest on top.
+    #[inline(always)]
+    fn insert(&mut self, base: usize, entry: Entry) {
         let mut place = self.length;
         self.length += 1;
-        while place > base && self.entries[place - 1].1 < near {
-            self.entries[place] = self.entries[place - 1];
+        while place > base && self.entries[(place - 1) % ENTRIES] < entry {
+            self.entries[place % ENTRIES] = self.entries[(place - 1) % ENTRIES];
             place -= 1;
         }
-        self.entries[place] = (child, near);
-    }
-
-    #[inline(always)]
-    fn pop(&mut self) -> (Child, f32) {
-        self.length -= 1;
-        self.entries[self.length]
+        self.entries[place % ENTRIES] = entry;
     }
 }
 
 /// What lies in the leaves.
 pub(crate) trait Leaves {
-    /// Test a leaf's items; on a hit nearer than `t_max` lower it and return true.
-    fn visit(&mut self, leaf: Child, t_max: &mut f32, stack: &mut Stack) -> bool;
+    /// Tests a leaf's items; a hit before `best` takes its place. Whether there was one.
+    fn visit(&mut self, leaf: Child, best: &mut Hit, stack: &mut Stack) -> bool;
+
+    /// Tells the memory that a leaf will be visited soon.
+    fn fetch(&self, leaf: Child);
 }
 
-/// Whether anything is hit before `t_max`, which ends up at the nearest hit; with `ANY`, at the first one found.
+/// Whether anything is hit before `best`, which becomes the nearest hit; with `ANY`, the first one found.
 #[inline(always)]
 pub(crate) fn walk<K: Kernel, const ANY: bool>(
     nodes: &[Node],
     ray: &SlabRay,
-    t_max: &mut f32,
+    best: &mut Hit,
     stack: &mut Stack,
     leaves: &mut impl Leaves,
 ) -> bool {
@@ -63,25 +97,31 @@ pub(crate) fn walk<K: Kernel, const ANY: bool>(
     let mut found = false;
     loop {
         if current.is_leaf() {
-            if leaves.visit(current, t_max, stack) {
+            if leaves.visit(current, best, stack) {
                 found = true;
                 if ANY {
                     stack.length = base;
                     return true;
                 }
             }
-        } else if let Some(nearest) = descend::<K, ANY>(&nodes[current.node()], ray, *t_max, stack)
-        {
-            current = nearest;
-            continue;
+        } else {
+            let fetch = |child: Child| match child.is_leaf() {
+                true => leaves.fetch(child),
+                false => K::fetch(nodes, child.node()..child.node() + 1),
+            };
+            let node = &nodes[current.node()];
+            if let Some(nearest) = descend::<K, ANY>(node, ray, best.t, stack, fetch) {
+                current = nearest;
+                continue;
+            }
         }
         loop {
             if stack.length == base {
                 return found;
             }
-            let (child, near) = stack.pop();
-            if ANY || near <= *t_max * SLAB_MARGIN {
-                current = child;
+            let entry = stack.pop();
+            if ANY || entry.near() <= best.t * SLAB_MARGIN {
+                current = entry.child();
                 break;
             }
         }
@@ -95,34 +135,49 @@ fn descend<K: Kernel, const ANY: bool>(
     ray: &SlabRay,
     t_max: f32,
     stack: &mut Stack,
+    fetch: impl Fn(Child),
 ) -> Option<Child> {
-    let (mut mask, near) = K::boxes(node, ray, t_max);
+    let (mut mask, entries) = K::boxes(node, ray, t_max);
+    let mut waiting = mask.count_ones();
+    if waiting <= 1 {
+        let slot = mask.trailing_zeros() as usize;
+        return (waiting == 1).then(|| entries[slot & 7].child());
+    }
+    // Memory is slow and several children wait: it can begin with all of them.
     let mut next = || {
         let slot = mask.trailing_zeros() as usize;
         mask &= mask.wrapping_sub(1);
-        (slot < 8).then(|| (node.child[slot & 7], near[slot & 7]))
+        fetch(entries[slot & 7].child());
+        entries[slot & 7]
     };
-    let first = next()?;
-    let Some(second) = next() else { return Some(first.0) };
+    let first = next();
     if ANY {
         // Any order finds whether there is a hit; sorting would only cost.
-        stack.push(second.0, 0.0);
-        while let Some((child, _)) = next() {
-            stack.push(child, 0.0);
+        while waiting > 1 {
+            stack.push(next());
+            waiting -= 1;
         }
-        return Some(first.0);
+        return Some(first.child());
     }
-    let (nearer, farther) = if second.1 < first.1 { (second, first) } else { (first, second) };
-    let Some(third) = next() else {
-        stack.push(farther.0, farther.1);
-        return Some(nearer.0);
-    };
+    let second = next();
+    let (nearer, farther) = (first.min(second), first.max(second));
+    if waiting == 2 {
+        stack.push(farther);
+        return Some(nearer.child());
+    }
+    let third = next();
     let base = stack.length;
-    stack.push(farther.0, farther.1);
-    stack.push(nearer.0, nearer.1);
-    stack.insert(base, third.0, third.1);
-    while let Some((child, near)) = next() {
-        stack.insert(base, child, near);
+    let (middle, farthest) = (farther.min(third), farther.max(third));
+    let (nearest, middle) = (nearer.min(middle), nearer.max(middle));
+    stack.push(farthest);
+    stack.push(middle);
+    if waiting == 3 {
+        return Some(nearest.child());
     }
-    Some(stack.pop().0)
+    stack.push(nearest);
+    while waiting > 3 {
+        stack.insert(base, next());
+        waiting -= 1;
+    }
+    Some(stack.pop().child())
 }

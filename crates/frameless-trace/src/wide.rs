@@ -22,6 +22,7 @@ impl Node {
 }
 
 /// An inner node's index, or a leaf: bit 31 set, then 2 bits of length − 1, then 29 bits of index.
+#[repr(transparent)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Child(u32);
 
@@ -35,6 +36,17 @@ impl Child {
         assert!((1..=4).contains(&length), "a leaf holds 1 to 4 items, not {length}");
         assert!(first <= Self::INDEX as usize, "more than 2²⁹ leaf items");
         Child(Self::LEAF | (length as u32 - 1) << Self::INDEX_BITS | first as u32)
+    }
+
+    #[inline(always)]
+    pub(crate) fn bits(self) -> u32 {
+        self.0
+    }
+
+    /// The inverse of [`Child::bits`].
+    #[inline(always)]
+    pub(crate) fn from_bits(bits: u32) -> Child {
+        Child(bits)
     }
 
     #[inline(always)]

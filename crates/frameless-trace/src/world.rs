@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use frameless_scene::{Geometry, Mesh, Scene};
-use glam::Vec3A;
+use glam::{Affine3A, Vec3A};
 use rayon::prelude::*;
 
 use crate::build::Blas;
@@ -63,8 +63,8 @@ impl World {
         let geometries = scene.geometries.par_iter().zip(is_rigid).zip(stands);
         let blas = geometries.map(|((geometry, is_rigid), stands)| match geometry {
             Geometry::Mesh(_) if stands => OnceLock::new(),
-            Geometry::Mesh(mesh) if is_rigid => Blas::new(mesh).into(),
-            _ => Blas::new(&Mesh::default()).into(),
+            Geometry::Mesh(mesh) if is_rigid => Blas::new(mesh, &Affine3A::IDENTITY).into(),
+            _ => Blas::new(&Mesh::default(), &Affine3A::IDENTITY).into(),
         });
         let holes: Vec<bool> = scene.geometries.iter().map(|g| has_holes(&scene, g)).collect();
         World {
@@ -114,11 +114,14 @@ impl World {
     /// Makes the trees of what stands still, for a moment at which it does not.
     #[cold]
     pub(crate) fn part_what_stands(&self) {
-        for (blas, geometry) in self.blas.iter().zip(&self.scene.geometries) {
-            blas.get_or_init(|| match geometry {
-                Geometry::Mesh(mesh) => Blas::new(mesh),
-                Geometry::Sphere { .. } => Blas::new(&Mesh::default()),
-            });
+        let Some(standing) = &self.standing else { return };
+        for (index, instance) in self.scene.instances.iter().enumerate() {
+            let geometry = instance.geometry as usize;
+            if let (Some(place), Geometry::Mesh(mesh)) =
+                (standing.place(index), &self.scene.geometries[geometry])
+            {
+                self.blas[geometry].get_or_init(|| Blas::new(mesh, place));
+            }
         }
     }
 

@@ -2,13 +2,16 @@
 //!
 //! SAFETY, once for all: every intrinsic needs the processor to have AVX2. The methods of [`Avx2`] are reached only from
 //! [`with`], whose caller holds a [`Detected`], and only [`Detected::new`] makes one, after asking the processor. Loads read
-//! whole rows of `Node` (aligned to 64, rows of 32 bytes) and `Pack` (aligned to 16, rows of 16 bytes), inside the arrays.
+//! whole rows of `Node` (aligned to 64, rows of 32 bytes, the last of which is its children, 4 bytes each) and `Pack` (aligned to 16, rows of 16 bytes), inside the arrays; eight
+//! [`Entry`] are eight numbers of 64 bits.
 //! The methods are `inline(always)` so that they end up inside [`with`], where these instructions may be emitted.
 #![allow(unsafe_code)]
 
 use std::arch::x86_64::*;
+use std::ops::Range;
 
 use super::{Kernel, Lanes, Pack, Portable, SLAB_MARGIN, ShearRay, SlabRay};
+use crate::traverse::Entry;
 use crate::wide::Node;
 
 /// Proof that the processor has what [`Avx2`] needs.
@@ -17,8 +20,10 @@ pub(crate) struct Detected(());
 
 impl Detected {
     pub(crate) fn new() -> Option<Detected> {
-        (is_x86_feature_detected!("avx2") && is_x86_feature_detected!("bmi1"))
-            .then_some(Detected(()))
+        (is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("popcnt"))
+        .then_some(Detected(()))
     }
 }
 
@@ -32,7 +37,7 @@ pub(crate) trait Task {
 /// Run a task with AVX2 code.
 #[inline]
 pub(crate) fn with<T: Task>(_proof: Detected, task: T) -> T::Output {
-    #[target_feature(enable = "avx2,bmi1")]
+    #[target_feature(enable = "avx2,bmi1,popcnt")]
     fn run<T: Task>(task: T) -> T::Output {
         task.run()
     }
@@ -45,7 +50,7 @@ pub(crate) struct Avx2;
 
 impl Kernel for Avx2 {
     #[inline(always)]
-    fn boxes(node: &Node, ray: &SlabRay, t_max: f32) -> (u32, [f32; 8]) {
+    fn boxes(node: &Node, ray: &SlabRay, t_max: f32) -> (u32, [Entry; 8]) {
         // SAFETY: see the module.
         unsafe {
             let plane = |axis: usize, far: usize| {
@@ -62,9 +67,26 @@ impl Kernel for Avx2 {
             }
             let far = _mm256_mul_ps(far, _mm256_set1_ps(SLAB_MARGIN));
             let mask = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(near, far)) as u32;
-            let mut entered = [0.0; 8];
-            _mm256_storeu_ps(entered.as_mut_ptr(), near);
-            (mask, entered)
+            // Pairs of slots in the order 0 2 1 3, so that interleaving within halves gives all in order.
+            let in_halves = |row| _mm256_permute4x64_epi64::<0b11_01_10_00>(row);
+            let child = in_halves(_mm256_load_si256(node.child.as_ptr().cast()));
+            let near = in_halves(_mm256_castps_si256(near));
+            let mut entries = [Entry::ROOT; 8];
+            let to = entries.as_mut_ptr().cast::<__m256i>();
+            _mm256_storeu_si256(to, _mm256_unpacklo_epi32(child, near));
+            _mm256_storeu_si256(to.add(1), _mm256_unpackhi_epi32(child, near));
+            (mask, entries)
+        }
+    }
+
+    #[inline(always)]
+    fn fetch<T>(items: &[T], range: Range<usize>) {
+        /// Bytes that come at once.
+        const LINE: usize = 64;
+        let first = items.as_ptr().wrapping_add(range.start).cast::<i8>();
+        for line in 0..(range.len() * size_of::<T>()).div_ceil(LINE) {
+            // SAFETY: see the module; a hint about any address is harmless.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(first.wrapping_add(line * LINE)) };
         }
     }
 
@@ -112,7 +134,7 @@ impl Kernel for Avx2 {
             let inverse = _mm_div_ps(_mm_set1_ps(1.0), determinant);
             let sum = _mm_add_ps(_mm_mul_ps(u, az), _mm_mul_ps(v, bz));
             let t = _mm_mul_ps(_mm_add_ps(sum, _mm_mul_ps(w, cz)), inverse);
-            let in_range = _mm_and_ps(_mm_cmpgt_ps(t, zero), _mm_cmplt_ps(t, _mm_set1_ps(t_max)));
+            let in_range = _mm_and_ps(_mm_cmpgt_ps(t, zero), _mm_cmple_ps(t, _mm_set1_ps(t_max)));
             let hit = _mm_and_ps(_mm_and_ps(inside, _mm_cmpneq_ps(determinant, zero)), in_range);
             lanes.mask = _mm_movemask_ps(hit) as u32;
             if lanes.mask != 0 {

@@ -1,0 +1,26 @@
+//! Large arrays on large pages: a ray that jumps about in a tree of a hundred megabytes else waits for the translation of addresses more
+//! often than for the memory itself.
+//!
+//! SAFETY, once for all: the advice names whole pages inside a slice that is borrowed for the time of the call. It changes neither what is
+//! in them nor who may use them; a system that does not know it, or has no large page left, says so and does nothing.
+#![allow(unsafe_code)]
+
+/// Asks the system to move what is in `items` to large pages, now. Does nothing for what is smaller than a few of them.
+pub(crate) fn prefer_large_pages<T>(items: &[T]) {
+    #[cfg(target_os = "linux")]
+    {
+        const LARGE: usize = 2 << 20;
+        let first = (items.as_ptr() as usize).next_multiple_of(LARGE);
+        let end = (items.as_ptr() as usize + size_of_val(items)) / LARGE * LARGE;
+        if first < end {
+            // SAFETY: see the module.
+            unsafe {
+                let (place, bytes) = (first as *mut libc::c_void, end - first);
+                libc::madvise(place, bytes, libc::MADV_HUGEPAGE);
+                libc::madvise(place, bytes, libc::MADV_COLLAPSE);
+            }
+        }
+    }
+    #[cfg(not(target_os = "linux"))]
+    let _ = items;
+}
