@@ -33,7 +33,7 @@ const TILE: u32 = 16;
 /// All sets of a scene: as many rays in each as the picture has pixels, or as of them hit something.
 pub(super) fn of_scene(world: &World, size: Size) -> Vec<Set> {
     let moment = world.moment(0.0);
-    let camera = Camera::new(&view(world.scene(), moment.state()), size);
+    let camera = Camera::new(&view(world, &moment), size);
     let mut rng = Rng::new(7);
     let scan: Vec<u32> = (0..size.pixels() as u32).collect();
     let random = shuffled(&mut rng, &scan);
@@ -52,16 +52,35 @@ pub(super) fn of_scene(world: &World, size: Size) -> Vec<Set> {
     sets
 }
 
-/// Of the scene's own camera; of a file that has none, from the middle of everything along its longer side: a camera that was added would
-/// see the walls from outside.
-fn view(scene: &Scene, state: &State) -> View {
+/// Of the scene's own camera; of a file that has none, from where there is most room towards the middle: a camera that was added would see
+/// the walls from outside.
+fn view(world: &World, moment: &Moment) -> View {
+    let (scene, state) = (world.scene(), moment.state());
     if !scene.notes.iter().any(|note| note.starts_with("no camera")) {
         return scene.view_at(state, 0);
     }
     let Some(bounds) = scene.bounds_at(state) else { return scene.view_at(state, 0) };
-    let (middle, size) = (bounds.centre(), bounds.max - bounds.min);
-    let along = if size.x > size.z { Vec3::X } else { Vec3::Z };
-    let world_from_camera = look_at(middle, middle + along, Vec3::Y);
+    let part = |k: u32| (k as f32 + 0.5) / 5.0;
+    let places = (0..25).map(|k| {
+        let share = Vec3::new(part(k % 5), 0.55, part(k / 5));
+        bounds.min + share * (bounds.max - bounds.min)
+    });
+    // Where there is most room: the way until something is hit is longest on average, and everything is inside.
+    let mut rng = Rng::new(9);
+    let directions: Vec<Vec3A> = (0..64).map(|_| unit(&mut rng)).collect();
+    let mut caster = world.caster(moment);
+    let mut room = |place: Vec3| -> f32 {
+        let way = |&direction: &Vec3A| {
+            let hit = caster.nearest(&Ray { origin: place.into(), direction });
+            hit.map_or(0.0, |hit| hit.t)
+        };
+        directions.iter().map(way).sum()
+    };
+    let rooms: Vec<(Vec3, f32)> = places.map(|place| (place, room(place))).collect();
+    let eye =
+        rooms.iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(bounds.centre(), |most| most.0);
+    let level = Vec3::new(bounds.centre().x, eye.y, bounds.centre().z);
+    let world_from_camera = look_at(eye, level, Vec3::Y);
     View { world_from_camera, projection: Projection::Perspective { yfov_rad: 1.0 } }
 }
 
