@@ -157,6 +157,11 @@ impl Canvas {
         self.updates
     }
 
+    /// The marks of all tiles, to be changed where they are and then given to [`Canvas::update`]. The canvas is without them until then.
+    pub(crate) fn lend(&mut self) -> Vec<TileMarks> {
+        self.traced.lend()
+    }
+
     /// What every pixel shows has been found out anew: when it was traced, whether it is known, and who waits to be traced. The
     /// old vectors are handed back, to be used again.
     ///

@@ -6,6 +6,7 @@
 use std::hint::select_unpredictable;
 
 use crate::ToneMap;
+use crate::wide::{F8, Unit};
 
 /// How linear radiance becomes a display colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +50,23 @@ impl Display {
             ToneMap::None => srgb_from_linear_rgb(rgb.map(|channel| channel * self.gain)),
             _ => self.encode_mapped(rgb),
         }
+    }
+
+    /// [`Display::encode`], eight at a time.
+    #[inline(always)]
+    pub(crate) fn encode_eight<U: Unit>(&self, [r, g, b]: [F8<U>; 3]) -> [F8<U>; 3] {
+        if self.tone_map == ToneMap::None {
+            let gain = F8::splat(self.gain);
+            return [
+                srgb_from_eight_linear(r * gain),
+                srgb_from_eight_linear(g * gain),
+                srgb_from_eight_linear(b * gain),
+            ];
+        }
+        let mut mapped = F8::triples([r, g, b]);
+        mapped.iter_mut().for_each(|rgb| *rgb = self.encode_mapped(*rgb));
+        let channel = |k: usize| F8::new(std::array::from_fn(|lane| mapped[lane][k]));
+        [channel(0), channel(1), channel(2)]
     }
 
     /// Apart, so that loops that map no tones stay small.
@@ -122,6 +140,21 @@ fn srgb_from_linear(linear: f32) -> f32 {
     let line = 12.92 * x;
     // Both, and no branch: it would keep the channels from being worked on at once.
     select_unpredictable(x <= 0.003_130_8, line, power.min(1.0))
+}
+
+/// The same, eight at a time.
+#[inline(always)]
+fn srgb_from_eight_linear<U: Unit>(linear: F8<U>) -> F8<U> {
+    let x = linear.clamped();
+    let root2 = x.sqrt();
+    let root4 = root2.sqrt();
+    let power = F8::splat(1.122_677_6) * root2 + F8::splat(0.196_137_15) * root4
+        - F8::splat(0.335_496_38) * (root2 * root4)
+        + F8::splat(0.081_327_64) * x
+        - F8::splat(0.064_611_68);
+    let one = F8::splat(1.0);
+    let power = one.or(one.less_than(power), power);
+    power.or(F8::splat(0.003_130_8).less_than(x), F8::splat(12.92) * x)
 }
 
 /// The same of three. Four at once are one vector's work; three by themselves take three times as long.

@@ -54,6 +54,9 @@ pub struct Placement {
 }
 
 impl Light {
+    /// Nearer than a tenth of a millimetre a point light would be without bound.
+    pub(crate) const NEAREST_SQUARED: f32 = 1e-8;
+
     /// I/r² · window · cone, or the irradiance of a light that is infinitely far away.
     ///
     /// window = clamp(1 − (r/range)⁴, 0, 1) and cone = clamp((cos − cos_outer)/(cos_inner − cos_outer), 0, 1)², both as
@@ -63,10 +66,8 @@ impl Light {
         let Some(position) = self.position else {
             return Arriving { direction: self.backwards, irradiance: self.intensity };
         };
-        // Nearer than a tenth of a millimetre a point light would be without bound.
-        const NEAREST_SQUARED: f32 = 1e-8;
         let towards: [f32; 3] = std::array::from_fn(|k| position[k] - point[k]);
-        let r2 = dot(towards, towards).max(NEAREST_SQUARED);
+        let r2 = dot(towards, towards).max(Light::NEAREST_SQUARED);
         let r = r2.sqrt();
         let direction = towards.map(|x| x / r);
         let window = if self.range.is_finite() {

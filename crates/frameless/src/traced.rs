@@ -89,11 +89,6 @@ pub(crate) fn half_ticks(secs: f32) -> i32 {
 #[repr(align(64))]
 pub(crate) struct TileMarks(pub(crate) [u32; TILE_PIXELS]);
 
-impl TileMarks {
-    /// Never traced.
-    pub(crate) const UNKNOWN: TileMarks = TileMarks([1; TILE_PIXELS]);
-}
-
 /// Marks of all pixels. Tiles at the border may have more than there are pixels; those mean nothing.
 #[derive(Clone, Debug)]
 pub(crate) struct Traced {
@@ -166,12 +161,17 @@ impl Traced {
         })
     }
 
+    /// The marks of all tiles, until they are given back by [`Traced::swap`].
+    pub(crate) fn lend(&mut self) -> Vec<TileMarks> {
+        std::mem::take(&mut self.tiles)
+    }
+
     /// The marks of all tiles are others from now on, at `now`. The old ones are handed back, to be used again.
     ///
     /// # Panics
     /// If there are not as many.
     pub(crate) fn swap(&mut self, now: Time, marks: &mut Vec<TileMarks>) {
-        assert_eq!(marks.len(), self.tiles.len());
+        assert_eq!(marks.len(), self.grid.len());
         std::mem::swap(&mut self.tiles, marks);
         self.latest = self.latest.max(now);
     }

@@ -15,8 +15,21 @@ pub(crate) trait Task {
     fn run<U: Unit>(self);
 }
 
-/// Runs `task`, with AVX2 where the processor has it.
+/// Runs `task`, with AVX2 where the processor has it, and with the registers and masks of AVX-512 where it has these.
 pub(crate) fn run(task: impl Task) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx512vl")
+        && is_x86_feature_detected!("avx512bw")
+        && is_x86_feature_detected!("avx512dq")
+        && is_x86_feature_detected!("avx2")
+    {
+        #[target_feature(enable = "avx2,avx512f,avx512vl,avx512bw,avx512dq")]
+        fn run_avx512(task: impl Task) {
+            task.run::<avx2::Avx2>()
+        }
+        // SAFETY: the processor has just been asked.
+        return unsafe { run_avx512(task) };
+    }
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") {
         #[target_feature(enable = "avx2")]
@@ -36,11 +49,17 @@ pub(crate) trait Unit: Copy {
     fn splat_f(x: f32) -> Self::F;
     fn load_f(lanes: &[f32; 8]) -> Self::F;
     fn store_f(a: Self::F, lanes: &mut [f32; 8]);
-    fn columns(rows: [&[f32; 4]; 8]) -> [Self::F; 4];
+    fn columns(rows: [&[f32; 8]; 8]) -> [Self::F; 8];
+    fn first_columns(rows: [&[f32; 8]; 8]) -> [Self::F; 4];
+    fn with_first(columns: [Self::F; 3], rows: [&[f32; 8]; 8]) -> [[f32; 8]; 8];
+    fn triples(columns: [Self::F; 3]) -> [[f32; 3]; 8];
+    fn to_bits(a: Self::F) -> Self::M;
+    fn from_bits(a: Self::M) -> Self::F;
     fn add_f(a: Self::F, b: Self::F) -> Self::F;
     fn sub_f(a: Self::F, b: Self::F) -> Self::F;
     fn mul_f(a: Self::F, b: Self::F) -> Self::F;
     fn div_f(a: Self::F, b: Self::F) -> Self::F;
+    fn sqrt_f(a: Self::F) -> Self::F;
     fn less_than_f(a: Self::F, b: Self::F) -> Self::M;
     fn select_f(mask: Self::M, a: Self::F, b: Self::F) -> Self::F;
     fn truncated(a: Self::F) -> Self::M;
@@ -49,11 +68,15 @@ pub(crate) trait Unit: Copy {
     fn store_m(a: Self::M, lanes: &mut [u32; 8]);
     fn equals(a: Self::M, b: Self::M) -> Self::M;
     fn less_than_m(a: Self::M, b: Self::M) -> Self::M;
+    fn select_m(mask: Self::M, a: Self::M, b: Self::M) -> Self::M;
+    fn not(a: Self::M) -> Self::M;
     fn and(a: Self::M, b: Self::M) -> Self::M;
     fn either(a: Self::M, b: Self::M) -> Self::M;
     fn plus(a: Self::M, b: Self::M) -> Self::M;
     fn minus(a: Self::M, b: Self::M) -> Self::M;
     fn times(a: Self::M, b: Self::M) -> Self::M;
+    fn packed(a: Self::M, lanes: u32) -> [u32; 8];
+    fn shifted_right<const BITS: i32>(a: Self::M) -> Self::M;
     fn to_f32(a: Self::M) -> Self::F;
     fn bits(a: Self::M) -> u32;
 }
@@ -65,6 +88,9 @@ pub(crate) struct F8<U: Unit>(U::F);
 /// Eight whole numbers at a time; as a mask, all bits of a lane are set or none.
 #[derive(Clone, Copy)]
 pub(crate) struct M8<U: Unit>(U::M);
+
+/// The bit of a number's sign.
+const SIGN: u32 = 1 << 31;
 
 impl<U: Unit> F8<U> {
     #[inline(always)]
@@ -90,6 +116,11 @@ impl<U: Unit> F8<U> {
         F8(U::load_f(&plane[start..start + 8].as_chunks().0[0]))
     }
 
+    #[inline(always)]
+    pub(crate) fn store(self, plane: &mut [f32], start: usize) {
+        U::store_f(self.0, &mut plane[start..start + 8].as_chunks_mut().0[0]);
+    }
+
     /// `self` where the mask is set, `other` elsewhere.
     #[inline(always)]
     pub(crate) fn or(self, mask: M8<U>, other: Self) -> Self {
@@ -110,15 +141,70 @@ impl<U: Unit> F8<U> {
     }
 
     #[inline(always)]
+    pub(crate) fn sqrt(self) -> Self {
+        F8(U::sqrt_f(self.0))
+    }
+
+    #[inline(always)]
+    pub(crate) fn abs(self) -> Self {
+        self.to_bits().and(M8::splat(!SIGN)).as_f32()
+    }
+
+    /// Of the absolute value.
+    #[inline(always)]
+    pub(crate) fn with_sign_of(self, other: Self) -> Self {
+        self.abs().to_bits().either(other.to_bits().and(M8::splat(SIGN))).as_f32()
+    }
+
+    /// `least` where there is less, or no number.
+    #[inline(always)]
+    pub(crate) fn at_least(self, least: Self) -> Self {
+        self.or(least.less_than(self), least)
+    }
+
+    /// To [0, 1].
+    #[inline(always)]
+    pub(crate) fn clamped(self) -> Self {
+        let (zero, one) = (F8::splat(0.0), F8::splat(1.0));
+        let least = zero.or(self.less_than(zero), self);
+        one.or(one.less_than(self), least)
+    }
+
+    #[inline(always)]
     pub(crate) fn less_than(self, other: Self) -> M8<U> {
         M8(U::less_than_f(self.0, other.0))
     }
 
-    /// The columns of eight rows of four.
+    /// The columns of eight rows.
     #[inline(always)]
-    pub(crate) fn columns(rows: [&[f32; 4]; 8]) -> [Self; 4] {
-        let [a, b, c, d] = U::columns(rows);
+    pub(crate) fn columns(rows: [&[f32; 8]; 8]) -> [Self; 8] {
+        let [a, b, c, d, e, f, g, h] = U::columns(rows);
+        [F8(a), F8(b), F8(c), F8(d), F8(e), F8(f), F8(g), F8(h)]
+    }
+
+    /// The first four of them.
+    #[inline(always)]
+    pub(crate) fn first_columns(rows: [&[f32; 8]; 8]) -> [Self; 4] {
+        let [a, b, c, d] = U::first_columns(rows);
         [F8(a), F8(b), F8(c), F8(d)]
+    }
+
+    /// `rows`, but for these columns instead of their first three.
+    #[inline(always)]
+    pub(crate) fn with_first([a, b, c]: [Self; 3], rows: [&[f32; 8]; 8]) -> [[f32; 8]; 8] {
+        U::with_first([a.0, b.0, c.0], rows)
+    }
+
+    /// Lane by lane one of each.
+    #[inline(always)]
+    pub(crate) fn triples([a, b, c]: [Self; 3]) -> [[f32; 3]; 8] {
+        U::triples([a.0, b.0, c.0])
+    }
+
+    /// Lane by lane as in [`f32::to_bits`].
+    #[inline(always)]
+    pub(crate) fn to_bits(self) -> M8<U> {
+        M8(U::to_bits(self.0))
     }
 
     /// Towards zero. Numbers that are not in 0..2³¹ give something.
@@ -194,9 +280,28 @@ impl<U: Unit> M8<U> {
         times times,
     );
 
+    /// All bits the other way.
     #[inline(always)]
     pub(crate) fn not(self) -> Self {
-        self.equals(M8::splat(0))
+        M8(U::not(self.0))
+    }
+
+    /// Lane by lane as in [`f32::from_bits`].
+    #[inline(always)]
+    pub(crate) fn as_f32(self) -> F8<U> {
+        F8(U::from_bits(self.0))
+    }
+
+    /// The lanes whose bit is set in `lanes`, one after the other, and something behind them.
+    #[inline(always)]
+    pub(crate) fn packed(self, lanes: u32) -> [u32; 8] {
+        U::packed(self.0, lanes)
+    }
+
+    /// As signed numbers.
+    #[inline(always)]
+    pub(crate) fn shifted_right<const BITS: i32>(self) -> Self {
+        M8(U::shifted_right::<BITS>(self.0))
     }
 
     /// As signed numbers.
@@ -208,7 +313,7 @@ impl<U: Unit> M8<U> {
     /// `self` where the mask is set, `other` elsewhere.
     #[inline(always)]
     pub(crate) fn or(self, mask: Self, other: Self) -> Self {
-        self.and(mask).either(mask.not().and(other))
+        M8(U::select_m(mask.0, self.0, other.0))
     }
 
     /// A mask of the first lanes.
@@ -253,7 +358,28 @@ impl<U: Unit> M8<U> {
     }
 }
 
-/// Planes of equal length, of which eight numbers at a time are read from the same place: one check for all.
+/// Places to be read around a place, as offsets from it.
+pub(crate) struct Offsets {
+    offsets: Vec<isize>,
+    least: isize,
+    most: isize,
+}
+
+impl Offsets {
+    pub(crate) fn new(offsets: impl IntoIterator<Item = isize>) -> Offsets {
+        let offsets: Vec<isize> = offsets.into_iter().collect();
+        let least = offsets.iter().copied().min().unwrap_or(0);
+        let most = offsets.iter().copied().max().unwrap_or(0);
+        Offsets { offsets, least, most }
+    }
+
+    #[inline(always)]
+    pub(crate) fn len(&self) -> usize {
+        self.offsets.len()
+    }
+}
+
+/// Planes of equal length, of which eight numbers at a time are read from the same places.
 #[derive(Clone, Copy)]
 pub(crate) struct Planes<'a, T, const N: usize> {
     planes: [&'a [T]; N],
@@ -266,15 +392,13 @@ impl<'a, T, const N: usize> Planes<'a, T, N> {
         Planes { planes, len }
     }
 
+    /// The places around `start`: one check for all.
     #[inline(always)]
-    fn eights(&self, start: usize) -> [&'a [T]; N] {
-        assert!(start < self.len && self.len - start >= 8);
-        // SAFETY: no plane is shorter than `len`, and eight numbers from `start` on are within it.
-        let mut eights = self.planes;
-        for eight in &mut eights {
-            *eight = unsafe { eight.get_unchecked(start..start + 8) };
-        }
-        eights
+    pub(crate) fn around(self, start: usize, offsets: &'a Offsets) -> Around<'a, T, N> {
+        let first = start.checked_add_signed(offsets.least);
+        let last = start.checked_add_signed(offsets.most).and_then(|last| last.checked_add(8));
+        assert!(first.is_some() && last.is_some_and(|last| last <= self.len));
+        Around { planes: self.planes, start, offsets: &offsets.offsets }
     }
 }
 
@@ -282,7 +406,47 @@ impl<const N: usize> Planes<'_, f32, N> {
     /// The eight from `start` on, of every plane.
     #[inline(always)]
     pub(crate) fn load<U: Unit>(&self, start: usize) -> [F8<U>; N] {
-        let (eights, mut loaded) = (self.eights(start), [F8::splat(0.0); N]);
+        assert!(start < self.len && self.len - start >= 8);
+        let mut loaded = [F8::splat(0.0); N];
+        for (loaded, plane) in loaded.iter_mut().zip(&self.planes) {
+            // SAFETY: no plane is shorter than `len`, and eight numbers from `start` on are within it.
+            *loaded = F8::load(unsafe { plane.get_unchecked(start..start + 8) }, 0);
+        }
+        loaded
+    }
+}
+
+/// Places in planes; all have eight numbers.
+pub(crate) struct Around<'a, T, const N: usize> {
+    planes: [&'a [T]; N],
+    start: usize,
+    offsets: &'a [isize],
+}
+
+impl<'a, T, const N: usize> Around<'a, T, N> {
+    #[inline(always)]
+    pub(crate) fn len(&self) -> usize {
+        self.offsets.len()
+    }
+
+    /// Of every plane the eight from place `k` on.
+    #[inline(always)]
+    fn eights(&self, k: usize) -> [&'a [T]; N] {
+        let first = self.start.wrapping_add_signed(self.offsets[k]);
+        let mut eights = self.planes;
+        for eight in &mut eights {
+            // SAFETY: `Planes::around` has seen that the eight numbers from every place on are within every plane.
+            *eight = unsafe { eight.get_unchecked(first..first + 8) };
+        }
+        eights
+    }
+}
+
+impl<const N: usize> Around<'_, f32, N> {
+    /// Of every plane the eight from place `k` on.
+    #[inline(always)]
+    pub(crate) fn load<U: Unit>(&self, k: usize) -> [F8<U>; N] {
+        let (eights, mut loaded) = (self.eights(k), [F8::splat(0.0); N]);
         for (loaded, eight) in loaded.iter_mut().zip(eights) {
             *loaded = F8::load(eight, 0);
         }
@@ -290,11 +454,11 @@ impl<const N: usize> Planes<'_, f32, N> {
     }
 }
 
-impl<const N: usize> Planes<'_, u32, N> {
-    /// The eight from `start` on, of every plane.
+impl<const N: usize> Around<'_, u32, N> {
+    /// Of every plane the eight from place `k` on.
     #[inline(always)]
-    pub(crate) fn load<U: Unit>(&self, start: usize) -> [M8<U>; N] {
-        let (eights, mut loaded) = (self.eights(start), [M8::splat(0); N]);
+    pub(crate) fn load<U: Unit>(&self, k: usize) -> [M8<U>; N] {
+        let (eights, mut loaded) = (self.eights(k), [M8::splat(0); N]);
         for (loaded, eight) in loaded.iter_mut().zip(eights) {
             *loaded = M8::load(eight, 0);
         }
@@ -333,15 +497,23 @@ mod tests {
             let [a, b] = self.numbers.map(F8::<U>::new);
             let [m, n] = self.wholes.map(M8::<U>::new);
             let mask = a.less_than(b);
-            let numbers = [a + b, a - b, a * b, a / b, a.or(mask, b), m.to_f32()];
-            let rows: [&[f32; 4]; 8] = std::array::from_fn(|k| {
-                self.numbers[k % 2][k / 4 * 4..].first_chunk().expect("four are left")
+            let numbers =
+                [a + b, a - b, a * b, a / b, a.or(mask, b), m.to_f32(), m.as_f32(), a.sqrt()];
+            // No two rows alike.
+            let rows: [[f32; 8]; 8] = std::array::from_fn(|k| {
+                std::array::from_fn(|lane| self.numbers[k % 2][lane] + k as f32)
             });
+            let rows = rows.each_ref();
             let bits = |x: F8<U>| x.lanes().map(f32::to_bits);
             self.results.extend(numbers.into_iter().chain(F8::columns(rows)).map(bits));
+            self.results.extend(F8::first_columns(rows).map(bits));
+            let triples = F8::triples([a, b, a - b]);
+            self.results.extend((0..3).map(|k| triples.map(|triple| triple[k].to_bits())));
+            self.results.extend(F8::with_first([a, b, a - b], rows).map(|r| r.map(f32::to_bits)));
             let wholes = [
                 mask,
                 a.truncated(),
+                a.to_bits(),
                 m.equals(n),
                 m.less_than(n),
                 m.and(n),
@@ -352,8 +524,14 @@ mod tests {
                 m.or(mask, n),
                 m.not(),
                 M8::first_lanes(3),
+                m.shifted_right::<10>(),
             ];
             self.results.extend(wholes.map(M8::lanes));
+            for lanes in 0..256 {
+                let mut packed = m.packed(lanes);
+                packed[lanes.count_ones() as usize..].fill(0);
+                self.results.push(packed);
+            }
             self.results.push([mask.bits(), mask.first().unwrap_or(8) as u32, 0, 0, 0, 0, 0, 0]);
         }
     }
@@ -373,7 +551,9 @@ mod tests {
             assert_eq!(portable, here);
             // By hand, so that not both are wrong alike.
             assert_eq!(f32::from_bits(here[0][3]), numbers[0][3] + numbers[1][3]);
-            assert_eq!(here[14], std::array::from_fn(|k| wholes[0][k] & wholes[1][k]));
+            let packed = here[here.len() - 257 + 0b1001_0010];
+            assert_eq!(packed[..4], [wholes[0][1], wholes[0][4], wholes[0][7], 0]);
+            assert_eq!(here[31 + 5], std::array::from_fn(|k| wholes[0][k] & wholes[1][k]));
         }
     }
 }

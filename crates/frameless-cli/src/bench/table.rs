@@ -5,7 +5,7 @@ use std::fmt::Write;
 use serde::Serialize;
 
 /// One figure: the median of several rounds, with the smallest and the largest.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub(super) struct Row {
     pub(super) name: String,
     /// The median.

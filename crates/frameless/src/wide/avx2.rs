@@ -28,24 +28,75 @@ impl Unit for Avx2 {
         unsafe { _mm256_storeu_ps(lanes.as_mut_ptr(), a) }
     }
 
-    /// Half by half, since 256-bit shuffles do not cross the middle.
     #[inline(always)]
-    fn columns([a, b, c, d, e, f, g, h]: [&[f32; 4]; 8]) -> [__m256; 4] {
+    fn columns(rows: [&[f32; 8]; 8]) -> [__m256; 8] {
         unsafe {
-            let pair = |low: &[f32; 4], high: &[f32; 4]| {
-                let low = _mm256_castps128_ps256(_mm_loadu_ps(low.as_ptr()));
-                _mm256_insertf128_ps::<1>(low, _mm_loadu_ps(high.as_ptr()))
-            };
-            let (ae, bf, cg, dh) = (pair(a, e), pair(b, f), pair(c, g), pair(d, h));
-            let (ab_low, cd_low) = (_mm256_unpacklo_ps(ae, bf), _mm256_unpacklo_ps(cg, dh));
-            let (ab_high, cd_high) = (_mm256_unpackhi_ps(ae, bf), _mm256_unpackhi_ps(cg, dh));
-            [
-                _mm256_shuffle_ps::<0b01_00_01_00>(ab_low, cd_low),
-                _mm256_shuffle_ps::<0b11_10_11_10>(ab_low, cd_low),
-                _mm256_shuffle_ps::<0b01_00_01_00>(ab_high, cd_high),
-                _mm256_shuffle_ps::<0b11_10_11_10>(ab_high, cd_high),
-            ]
+            let [a, b, c, d] = four_columns::<0>(rows);
+            let [e, f, g, h] = four_columns::<4>(rows);
+            [a, b, c, d, e, f, g, h]
         }
+    }
+
+    #[inline(always)]
+    fn first_columns(rows: [&[f32; 8]; 8]) -> [__m256; 4] {
+        unsafe { four_columns::<0>(rows) }
+    }
+
+    #[inline(always)]
+    fn with_first([a, b, c]: [__m256; 3], rows: [&[f32; 8]; 8]) -> [[f32; 8]; 8] {
+        let mut changed = [[0.0; 8]; 8];
+        unsafe {
+            // Rows 0 to 3 in the lower halves, 4 to 7 in the upper ones.
+            let (ab_low, c_low) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, c));
+            let (ab_high, c_high) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, c));
+            let firsts = [
+                _mm256_shuffle_ps::<0b01_00_01_00>(ab_low, c_low),
+                _mm256_shuffle_ps::<0b11_10_11_10>(ab_low, c_low),
+                _mm256_shuffle_ps::<0b01_00_01_00>(ab_high, c_high),
+                _mm256_shuffle_ps::<0b11_10_11_10>(ab_high, c_high),
+            ];
+            for (k, lower) in firsts.into_iter().enumerate() {
+                let upper = _mm256_permute2f128_ps::<0x11>(lower, lower);
+                for (row, first) in [(k, lower), (k + 4, upper)] {
+                    let rest = _mm256_loadu_ps(rows[row].as_ptr());
+                    let whole = _mm256_blend_ps::<0b0000_0111>(rest, first);
+                    _mm256_storeu_ps(changed[row].as_mut_ptr(), whole);
+                }
+            }
+        }
+        changed
+    }
+
+    #[inline(always)]
+    fn triples([a, b, c]: [__m256; 3]) -> [[f32; 3]; 8] {
+        let mut triples = [[0.0; 3]; 8];
+        unsafe {
+            // By halves: a0 a2 b0 b2; b1 b3 c1 c3; c0 c2 a1 a3.
+            let ab = _mm256_shuffle_ps::<0b10_00_10_00>(a, b);
+            let bc = _mm256_shuffle_ps::<0b11_01_11_01>(b, c);
+            let ca = _mm256_shuffle_ps::<0b11_01_10_00>(c, a);
+            let parts = [
+                _mm256_shuffle_ps::<0b10_00_10_00>(ab, ca),
+                _mm256_shuffle_ps::<0b11_01_10_00>(bc, ab),
+                _mm256_shuffle_ps::<0b11_01_11_01>(ca, bc),
+            ];
+            let to = triples.as_mut_ptr().cast::<f32>();
+            for (k, part) in parts.into_iter().enumerate() {
+                _mm_storeu_ps(to.add(4 * k), _mm256_castps256_ps128(part));
+                _mm_storeu_ps(to.add(12 + 4 * k), _mm256_extractf128_ps::<1>(part));
+            }
+        }
+        triples
+    }
+
+    #[inline(always)]
+    fn to_bits(a: __m256) -> __m256i {
+        unsafe { _mm256_castps_si256(a) }
+    }
+
+    #[inline(always)]
+    fn from_bits(a: __m256i) -> __m256 {
+        unsafe { _mm256_castsi256_ps(a) }
     }
 
     #[inline(always)]
@@ -66,6 +117,11 @@ impl Unit for Avx2 {
     #[inline(always)]
     fn div_f(a: __m256, b: __m256) -> __m256 {
         unsafe { _mm256_div_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn sqrt_f(a: __m256) -> __m256 {
+        unsafe { _mm256_sqrt_ps(a) }
     }
 
     #[inline(always)]
@@ -109,6 +165,16 @@ impl Unit for Avx2 {
     }
 
     #[inline(always)]
+    fn select_m(mask: __m256i, a: __m256i, b: __m256i) -> __m256i {
+        unsafe { _mm256_blendv_epi8(b, a, mask) }
+    }
+
+    #[inline(always)]
+    fn not(a: __m256i) -> __m256i {
+        unsafe { _mm256_xor_si256(a, _mm256_set1_epi32(-1)) }
+    }
+
+    #[inline(always)]
     fn and(a: __m256i, b: __m256i) -> __m256i {
         unsafe { _mm256_and_si256(a, b) }
     }
@@ -134,6 +200,22 @@ impl Unit for Avx2 {
     }
 
     #[inline(always)]
+    fn packed(a: __m256i, lanes: u32) -> [u32; 8] {
+        let (order, mut packed) = (&PACKED[(lanes & 255) as usize], [0; 8]);
+        unsafe {
+            let order = _mm256_loadu_si256(order.as_ptr().cast());
+            let lanes = _mm256_permutevar8x32_epi32(a, order);
+            _mm256_storeu_si256(packed.as_mut_ptr().cast(), lanes);
+        }
+        packed
+    }
+
+    #[inline(always)]
+    fn shifted_right<const BITS: i32>(a: __m256i) -> __m256i {
+        unsafe { _mm256_srai_epi32::<BITS>(a) }
+    }
+
+    #[inline(always)]
     fn to_f32(a: __m256i) -> __m256 {
         unsafe { _mm256_cvtepi32_ps(a) }
     }
@@ -141,5 +223,47 @@ impl Unit for Avx2 {
     #[inline(always)]
     fn bits(a: __m256i) -> u32 {
         unsafe { _mm256_movemask_ps(_mm256_castsi256_ps(a)) as u32 }
+    }
+}
+
+/// Of eight bits: the numbers of those that are set, one after the other.
+static PACKED: [[u32; 8]; 256] = {
+    let mut packed = [[0; 8]; 256];
+    let mut bits = 0;
+    while bits < 256 {
+        let (mut lane, mut len) = (0, 0);
+        while lane < 8 {
+            if bits & (1 << lane) != 0 {
+                packed[bits][len] = lane;
+                len += 1;
+            }
+            lane += 1;
+        }
+        bits += 1;
+    }
+    packed
+};
+
+/// Columns `FIRST` to `FIRST + 3`, half by half, since 256-bit shuffles do not cross the middle.
+///
+/// # Safety
+/// The processor has AVX2, and `FIRST` is 0 or 4.
+#[inline(always)]
+unsafe fn four_columns<const FIRST: usize>(rows: [&[f32; 8]; 8]) -> [__m256; 4] {
+    unsafe {
+        let [a, b, c, d, e, f, g, h] = rows;
+        let pair = |low: &[f32; 8], high: &[f32; 8]| {
+            let low = _mm256_castps128_ps256(_mm_loadu_ps(low.as_ptr().add(FIRST)));
+            _mm256_insertf128_ps::<1>(low, _mm_loadu_ps(high.as_ptr().add(FIRST)))
+        };
+        let (ae, bf, cg, dh) = (pair(a, e), pair(b, f), pair(c, g), pair(d, h));
+        let (ab_low, cd_low) = (_mm256_unpacklo_ps(ae, bf), _mm256_unpacklo_ps(cg, dh));
+        let (ab_high, cd_high) = (_mm256_unpackhi_ps(ae, bf), _mm256_unpackhi_ps(cg, dh));
+        [
+            _mm256_shuffle_ps::<0b01_00_01_00>(ab_low, cd_low),
+            _mm256_shuffle_ps::<0b11_10_11_10>(ab_low, cd_low),
+            _mm256_shuffle_ps::<0b01_00_01_00>(ab_high, cd_high),
+            _mm256_shuffle_ps::<0b11_10_11_10>(ab_high, cd_high),
+        ]
     }
 }

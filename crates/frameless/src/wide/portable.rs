@@ -35,8 +35,37 @@ impl Unit for Portable {
     }
 
     #[inline(always)]
-    fn columns(rows: [&[f32; 4]; 8]) -> [[f32; 8]; 4] {
+    fn columns(rows: [&[f32; 8]; 8]) -> [[f32; 8]; 8] {
         std::array::from_fn(|k| rows.map(|row| row[k]))
+    }
+
+    #[inline(always)]
+    fn first_columns(rows: [&[f32; 8]; 8]) -> [[f32; 8]; 4] {
+        std::array::from_fn(|k| rows.map(|row| row[k]))
+    }
+
+    #[inline(always)]
+    fn with_first([a, b, c]: [[f32; 8]; 3], rows: [&[f32; 8]; 8]) -> [[f32; 8]; 8] {
+        std::array::from_fn(|k| {
+            let [_, _, _, rest @ ..] = *rows[k];
+            let [d, e, f, g, h] = rest;
+            [a[k], b[k], c[k], d, e, f, g, h]
+        })
+    }
+
+    #[inline(always)]
+    fn triples([a, b, c]: [[f32; 8]; 3]) -> [[f32; 3]; 8] {
+        std::array::from_fn(|k| [a[k], b[k], c[k]])
+    }
+
+    #[inline(always)]
+    fn to_bits(a: [f32; 8]) -> [u32; 8] {
+        a.map(f32::to_bits)
+    }
+
+    #[inline(always)]
+    fn from_bits(a: [u32; 8]) -> [f32; 8] {
+        a.map(f32::from_bits)
     }
 
     #[inline(always)]
@@ -57,6 +86,11 @@ impl Unit for Portable {
     #[inline(always)]
     fn div_f(a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
         lanes(a, b, |a, b| a / b)
+    }
+
+    #[inline(always)]
+    fn sqrt_f(a: [f32; 8]) -> [f32; 8] {
+        a.map(f32::sqrt)
     }
 
     #[inline(always)]
@@ -100,6 +134,16 @@ impl Unit for Portable {
     }
 
     #[inline(always)]
+    fn select_m(mask: [u32; 8], a: [u32; 8], b: [u32; 8]) -> [u32; 8] {
+        std::array::from_fn(|k| if mask[k] == 0 { b[k] } else { a[k] })
+    }
+
+    #[inline(always)]
+    fn not(a: [u32; 8]) -> [u32; 8] {
+        a.map(|a| !a)
+    }
+
+    #[inline(always)]
     fn and(a: [u32; 8], b: [u32; 8]) -> [u32; 8] {
         lanes(a, b, |a, b| a & b)
     }
@@ -122,6 +166,23 @@ impl Unit for Portable {
     #[inline(always)]
     fn times(a: [u32; 8], b: [u32; 8]) -> [u32; 8] {
         lanes(a, b, u32::wrapping_mul)
+    }
+
+    #[inline(always)]
+    fn packed(a: [u32; 8], lanes: u32) -> [u32; 8] {
+        let (mut packed, mut len) = ([0; 8], 0);
+        for (k, lane) in a.into_iter().enumerate() {
+            if lanes & (1 << k) != 0 {
+                packed[len] = lane;
+                len += 1;
+            }
+        }
+        packed
+    }
+
+    #[inline(always)]
+    fn shifted_right<const BITS: i32>(a: [u32; 8]) -> [u32; 8] {
+        a.map(|a| (a as i32 >> BITS) as u32)
     }
 
     #[inline(always)]

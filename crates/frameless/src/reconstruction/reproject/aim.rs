@@ -46,8 +46,8 @@ impl Reproject {
             let (x, y) = size.xy(later.pixel);
             for cell in self.store.of_pixel(x, y) {
                 wide::prefetch(&self.store.object, cell);
-                wide::prefetch(&self.store.tick, cell);
-                wide::prefetch(&self.store.anchor, cell);
+                wide::prefetch(&self.store.record, cell);
+                wide::prefetch(&self.store.surfel, cell);
             }
         }
         if let Some(soon) = requests.get(i + AHEAD / 2) {
@@ -55,8 +55,8 @@ impl Reproject {
             if self.store.newest(x, y).is_none() {
                 for cell in self.cells_around(x, y) {
                     wide::prefetch(&self.store.object, cell);
-                    wide::prefetch(&self.store.depth, cell);
-                    wide::prefetch(&self.store.anchor, cell);
+                    wide::prefetch(&self.store.record, cell);
+                    wide::prefetch(&self.store.surfel, cell);
                 }
             }
         }
@@ -90,7 +90,7 @@ impl Reproject {
     /// The farthest sample around a hole.
     fn uncovered(&self, x: u32, y: u32) -> Option<usize> {
         let near = self.cells_around(x, y).filter_map(|first| self.store.newest_of(first));
-        near.max_by(|&a, &b| self.store.depth[a].total_cmp(&self.store.depth[b]))
+        near.max_by(|&a, &b| self.store.depth(a).total_cmp(&self.store.depth(b)))
     }
 
     /// First cells of the pixels [`AROUND`].

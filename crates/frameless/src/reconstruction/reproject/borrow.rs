@@ -292,7 +292,7 @@ struct Pair<U: Unit> {
 mod tests {
     use super::*;
     use crate::Rng;
-    use crate::reconstruction::reproject::store::{Sample, Shade, Tick};
+    use crate::reconstruction::reproject::store::{Lit, Record, Sample, Surfel};
 
     const SIZE: Size = Size { width: 40, height: 32 };
 
@@ -301,15 +301,10 @@ mod tests {
         let mut store = Store::new(SIZE, 1);
         for y in 0..SIZE.height {
             for x in 0..SIZE.width {
-                let sample = Sample {
-                    rgb: [0.0; 3],
-                    px: [x as f32 + 0.5, y as f32 + 0.5],
-                    depth: 1.0,
-                    tick: Tick(1),
-                    object: object(x, y),
-                    anchor: Default::default(),
-                    shade: Shade::default(),
-                };
+                let px = [x as f32 + 0.5, y as f32 + 0.5];
+                let record = Record([px[0], px[1], 1.0, f32::from_bits(1), 0.0, 0.0, 0.0, 0.0]);
+                let (surfel, lit) = (Surfel::default(), Lit::default());
+                let sample = Sample { object: object(x, y), record, surfel, lit };
                 store.insert(&sample, false);
             }
         }

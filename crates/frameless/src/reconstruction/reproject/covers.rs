@@ -91,11 +91,11 @@ impl Covers {
         if matches!(store.object[cell], EMPTY | SCREEN) {
             return;
         }
-        let [x, y] = sample.px.map(|p| p as u32 / TILE);
+        let [x, y] = sample.record.px().map(|p| p as u32 / TILE);
         let tile = &mut self.tiles[(y * self.columns + x) as usize];
-        if sample.depth < COVERS * store.depth[cell] {
+        if sample.record.depth() < COVERS * store.depth(cell) {
             if tile.covering == 0 {
-                *tile = Tile { begun: sample.tick, covering: 0, others: 0 };
+                *tile = Tile { begun: sample.record.tick(), covering: 0, others: 0 };
             }
             tile.covering += 1;
         } else {
@@ -117,9 +117,9 @@ impl Covers {
             for (dy, dx) in blocks.clone().flat_map(|dy| blocks.clone().map(move |dx| (dy, dx))) {
                 for &(x, y) in &self.probes[..PROBES] {
                     let (x, y) = (x0 + dx + x, y0 + dy + y);
-                    let is_old = |cell: usize| begun.is_later_than(Tick(store.tick[cell]));
+                    let is_old = |cell: usize| begun.is_later_than(store.tick(cell));
                     if x < size.width && y < size.height && store.newest(x, y).is_some_and(is_old) {
-                        waiting.push(size.index(x, y), x, y, Hole::Large);
+                        waiting.push(Hole::Large, &[size.index(x, y)]);
                     }
                 }
             }
@@ -221,9 +221,9 @@ fn look_around<U: Unit>(
                     let cell = store.layout.of_pixel(x, y) + sub * store.layout.plane;
                     let is_sample = M8::load(&store.object, cell).equals(M8::splat(EMPTY)).not();
                     // As with single ticks: later than or at the same time, modulo 2³².
-                    let since = M8::load(&store.tick, cell).minus(M8::splat(begun.0));
+                    let since = store.ticks::<U>(cell).minus(M8::splat(begun.0));
                     let is_new = since.less_than(M8::splat(0)).not().and(is_sample);
-                    let depth = F8::load(&store.depth, cell);
+                    let depth = store.depths(cell);
                     eight = depth.or(is_new.and(eight.less_than(depth)), eight);
                 }
             }
@@ -245,13 +245,16 @@ fn within(at: i32, end: u32) -> Range<i32> {
 
 /// The same for blocks of `scale`×`scale` smallest ones, at the place of each of these.
 fn coarser(fine: &[[f32; AROUND]; AROUND], scale: usize) -> [[f32; AROUND]; AROUND] {
-    std::array::from_fn(|by| {
-        std::array::from_fn(|bx| {
-            let [rows, columns] = [by, bx].map(|at| at / scale * scale..(at / scale + 1) * scale);
-            let blocks = rows.flat_map(|row| columns.clone().map(move |column| fine[row][column]));
-            blocks.fold(NOTHING, f32::max)
-        })
-    })
+    let mut coarse = [[NOTHING; AROUND]; AROUND];
+    for (fine, coarse) in fine.chunks(scale).zip(coarse.chunks_mut(scale)) {
+        for left in (0..AROUND).step_by(scale) {
+            let columns = left..left + scale;
+            let most = fine.iter().flat_map(|row| &row[columns.clone()]).copied();
+            let most = most.fold(NOTHING, f32::max);
+            coarse.iter_mut().for_each(|row| row[columns.clone()].fill(most));
+        }
+    }
+    coarse
 }
 
 /// The depth of the farthest new sample in a block of `scale` smallest ones and in its pinwheel; `None` if a vane that is inside
@@ -279,10 +282,10 @@ fn take_away(store: &mut Store, [x0, y0]: [u32; 2], begun: Tick, limit: f32) {
     for y in y0..(y0 + BLOCK).min(height) {
         for x in x0..(x0 + BLOCK).min(width) {
             for cell in store.of_pixel(x, y) {
-                let is_older = begun.is_later_than(Tick(store.tick[cell]));
+                let is_older = begun.is_later_than(store.tick(cell));
                 let is_known = store.object[cell] != SCREEN;
-                if is_older && is_known && store.depth[cell] > limit {
-                    store.object[cell] = EMPTY;
+                if is_older && is_known && store.depth(cell) > limit {
+                    store.remove(cell);
                 }
             }
         }
@@ -291,20 +294,18 @@ fn take_away(store: &mut Store, [x0, y0]: [u32; 2], begun: Tick, limit: f32) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::store::{Anchor, Shade};
+    use super::super::store::{Lit, Record, Surfel};
     use super::*;
 
     const SIZE: Size = Size { width: 64, height: 48 };
 
     fn sample(x: f32, y: f32, depth: f32, tick: u32) -> Sample {
+        let tick = f32::from_bits(tick);
         Sample {
-            rgb: [0.5; 3],
-            px: [x + 0.5, y + 0.5],
-            depth,
-            tick: Tick(tick),
             object: u32::from(depth < 5.0),
-            anchor: Anchor::default(),
-            shade: Shade::default(),
+            record: Record([x + 0.5, y + 0.5, depth, tick, 0.5, 0.5, 0.5, 0.0]),
+            surfel: Surfel::default(),
+            lit: Lit::default(),
         }
     }
 
@@ -319,13 +320,13 @@ mod tests {
         for (x, y) in pixels().filter(|(x, y)| (x + 3 * y) % 5 == 0) {
             let depth = if near(x, y) { 1.0 } else { 10.0 };
             let new = sample(x as f32, y as f32, depth, 2);
-            let cell = store.layout.of_px(new.px).expect("inside");
+            let cell = store.layout.of_px(new.record.px()).expect("inside");
             covers.note(&store, cell, &new);
             store.insert(&new, false);
         }
         covers.run(&mut store);
         let is_far =
-            |&(x, y): &(u32, u32)| store.newest(x, y).is_some_and(|cell| store.depth[cell] > 5.0);
+            |&(x, y): &(u32, u32)| store.newest(x, y).is_some_and(|cell| store.depth(cell) > 5.0);
         pixels().filter(is_far).collect()
     }
 
@@ -367,7 +368,7 @@ mod tests {
         let probed = |covers: &Covers, store: &Store| {
             let (mut waiting, mut ordered) = (Waiting::default(), Vec::new());
             covers.probe(store, &mut waiting);
-            waiting.order(&mut ordered);
+            waiting.order(SIZE.width, &mut ordered);
             ordered
         };
         assert_eq!(probed(&covers, &store), [], "nothing is suspect");
@@ -384,12 +385,12 @@ mod tests {
         for &pixel in &first[..blocks] {
             let (x, y) = SIZE.xy(pixel);
             let new = sample(x as f32, y as f32, 1.0, 3);
-            covers.note(&store, store.layout.of_px(new.px).expect("inside"), &new);
+            covers.note(&store, store.layout.of_px(new.record.px()).expect("inside"), &new);
             store.insert(&new, false);
         }
         covers.run(&mut store);
         let is_far =
-            |&(x, y): &(u32, u32)| store.newest(x, y).is_some_and(|cell| store.depth[cell] > 5.0);
+            |&(x, y): &(u32, u32)| store.newest(x, y).is_some_and(|cell| store.depth(cell) > 5.0);
         assert_eq!(pixels().filter(is_far).count(), 0);
         covers.run(&mut store);
         assert!(probed(&covers, &store).iter().all(|pixel| !first[..blocks].contains(pixel)));

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use super::store::{EMPTY, Layout, Store};
 use crate::bands;
-use crate::wide::{self, F8, M8, Unit};
+use crate::wide::{self, F8, M8, Offsets, Planes, Unit};
 
 /// A neighbour nearer by more than this ratio covers what is behind it.
 const COVERS: f32 = 0.07;
@@ -25,7 +25,7 @@ pub(super) fn remove(store: &mut Store, threads: usize, covered: &mut Vec<Vec<u3
     });
     bands::run(threads, bands.collect(), wide::run);
     for i in covered.iter_mut().flat_map(|cells| cells.drain(..)) {
-        store.object[i as usize] = EMPTY;
+        store.remove(i as usize);
     }
 }
 
@@ -57,8 +57,8 @@ impl wide::Task for Cracks<'_> {
 
 /// From a cell to those within a pixel's distance.
 struct Around {
-    offsets: [isize; 24],
-    len: usize,
+    offsets: Vec<isize>,
+    objects: Offsets,
     /// How many may be there that do not cover.
     others: u32,
 }
@@ -68,16 +68,16 @@ impl Around {
         let n = layout.per_side as i32;
         let (sx, sy) = (sub % n, sub / n);
         let here = layout.neighbour(1, 1, sx, sy) as isize;
-        let (mut offsets, mut len) = ([0; 24], 0);
+        let mut offsets = Vec::new();
         for dy in -n..=n {
             for dx in -n..=n {
                 if (dx, dy) != (0, 0) {
-                    offsets[len] = layout.neighbour(1, 1, sx + dx, sy + dy) as isize - here;
-                    len += 1;
+                    offsets.push(layout.neighbour(1, 1, sx + dx, sy + dy) as isize - here);
                 }
             }
         }
-        Around { offsets, len, others: 1 + 2 * (n as u32 - 1) }
+        let objects = Offsets::new(offsets.iter().copied());
+        Around { offsets, objects, others: 1 + 2 * (n as u32 - 1) }
     }
 }
 
@@ -93,24 +93,23 @@ fn are_covered<U: Unit>(store: &Store, first: usize, around: &Around) -> M8<U> {
     if !candidates.any() {
         return none;
     }
-    let offsets = &around.offsets[..around.len];
     // Masks are −1 where they are set: counts are kept negative.
     let mut foreign = none;
-    for &offset in offsets {
-        let others = M8::load(&store.object, first.wrapping_add_signed(offset));
+    let objects_around = Planes::new([&store.object]).around(first, &around.objects);
+    for k in 0..objects_around.len() {
+        let [others] = objects_around.load(k);
         foreign = foreign.plus(others.equals(objects).not().and(others.equals(empty).not()));
     }
     let candidates = candidates.and(foreign.less_than(M8::splat(-5i32 as u32)));
     if !candidates.any() {
         return none;
     }
-    let limit = F8::load(&store.depth, first) * F8::splat(1.0 - COVERS);
+    let limit = store.depths::<U>(first) * F8::splat(1.0 - COVERS);
     let (mut nearer, mut samples) = (none, none);
-    for &offset in offsets {
-        let j = first.wrapping_add_signed(offset);
-        let others = M8::load(&store.object, j);
+    for (k, &offset) in around.offsets.iter().enumerate() {
+        let [others] = objects_around.load(k);
         let is_sample = others.equals(empty).not();
-        let covers = F8::load(&store.depth, j).less_than(limit);
+        let covers = store.depths::<U>(first.wrapping_add_signed(offset)).less_than(limit);
         samples = samples.plus(is_sample);
         nearer = nearer.plus(is_sample.and(covers).and(others.equals(objects).not()));
     }

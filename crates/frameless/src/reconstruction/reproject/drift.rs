@@ -11,7 +11,7 @@
 //! about the number of samples if they agree, 1 if they do not: then there is no drift. Steps (edges of shadows, what moves in
 //! a mirror) are left out.
 
-use super::store::{EMPTY, Store, Tick};
+use super::store::{EMPTY, Store};
 use crate::{Size, Time};
 
 /// Side of a tile, in pixels.
@@ -108,11 +108,12 @@ fn go_on(
                 if store.object[cell] >= EMPTY || !rests(store.object[cell]) {
                     continue;
                 }
-                let age_secs = now.secs_since(Tick(store.tick[cell]).time(now)) as f32;
+                let age_secs = now.secs_since(store.tick(cell).time(now)) as f32;
                 let secs = age_secs.min(interval_secs);
-                for (plane, drift) in store.rgb.iter_mut().zip(drift) {
-                    plane[cell] = (plane[cell] * (1.0 + drift * secs)).clamp(0.0, 1.0);
-                }
+                let rgb = store.record[cell].rgb();
+                let go_on = |k: usize| (rgb[k] * (1.0 + drift[k] * secs)).clamp(0.0, 1.0);
+                store.record[cell].set_rgb(std::array::from_fn(go_on));
+                store.touched.mark(x, y);
             }
         }
     }
@@ -127,7 +128,7 @@ fn drift(change: f32, light: f32, square: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::store::{Anchor, Sample, Shade};
+    use super::super::store::{Lit, Record, Sample, Surfel, Tick};
     use super::*;
 
     const SIZE: Size = Size { width: 16, height: 16 };
@@ -136,18 +137,10 @@ mod tests {
     fn floor() -> Store {
         let mut store = Store::new(SIZE, 1);
         for (y, x) in (0..16).flat_map(|y| (0..16).map(move |x| (y, x))) {
-            store.insert(
-                &Sample {
-                    rgb: colour(x, 1.0),
-                    px: [x as f32 + 0.5, y as f32 + 0.5],
-                    depth: 1.0,
-                    tick: Tick(0),
-                    object: 0,
-                    anchor: Anchor::default(),
-                    shade: Shade::default(),
-                },
-                false,
-            );
+            let [r, g, b] = colour(x, 1.0);
+            let record = Record([x as f32 + 0.5, y as f32 + 0.5, 1.0, 0.0, r, g, b, 0.0]);
+            let (surfel, lit) = (Surfel::default(), Lit::default());
+            store.insert(&Sample { object: 0, record, surfel, lit }, false);
         }
         store
     }
@@ -167,12 +160,12 @@ mod tests {
             for x in (0..4).map(|i| (5 * refresh + 7 * i) % 15) {
                 let (y, cell) =
                     (refresh % 16, store.layout.of_pixel(x as i32, (refresh % 16) as i32));
-                let before = std::array::from_fn(|k| store.rgb[k][cell]);
-                let age_secs = now.secs_since(Tick(store.tick[cell]).time(now)) as f32;
+                let before = store.record[cell].rgb();
+                let age_secs = now.secs_since(store.tick(cell).time(now)) as f32;
                 let new = colour(x, light(secs, x));
                 drift.note([x, y], before, new, age_secs);
-                (0..3).for_each(|k| store.rgb[k][cell] = new[k]);
-                store.tick[cell] = Tick::of(now).0;
+                store.record[cell].set_rgb(new);
+                store.record[cell].0[3] = f32::from_bits(Tick::of(now).0);
             }
             drift.run(&mut store, now, 1.0 / 60.0, |_| true);
         }
@@ -180,7 +173,7 @@ mod tests {
         (0..16)
             .map(|x| {
                 let cell = store.layout.of_pixel(x, 15);
-                (store.rgb[0][cell] - colour(x as u32, light(0.5, 15))[0]).abs()
+                (store.record[cell].rgb()[0] - colour(x as u32, light(0.5, 15))[0]).abs()
             })
             .fold(0.0, f32::max)
     }
@@ -211,6 +204,7 @@ mod tests {
         }
         let mut store = floor();
         drift.run(&mut store, Time::from_secs(1.0), 0.1, |_| true);
-        assert!(store.rgb[0] == floor().rgb[0]);
+        let colours = |store: &Store| store.record.iter().map(Record::rgb).collect::<Vec<_>>();
+        assert!(colours(&store) == colours(&floor()));
     }
 }

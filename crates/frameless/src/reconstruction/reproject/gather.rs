@@ -8,42 +8,105 @@
 //! The reference is the pixel's own sample with the least expected error. Pixels without one are holes: beside samples they show
 //! the mean of those around that belong to the nearest one's object, farther away what the nearest pixel shows that is no hole
 //! ([`fill`](super::fill)).
+//!
+//! A tile in which nothing has been touched goes on showing what it shows, as long as all its samples would still be taken as they are.
 
 use std::ops::Range;
 
 use super::fill::{self, AROUND};
 use super::holes::{Hole, Waiting};
 use super::smooth::Smooth;
-use super::store::{EMPTY, Layout, Store, TICK_SECS, Tick, centres, distance2};
-use crate::Time;
+use super::store::{self, CENTRAL_PX, EMPTY, Layout, Store, TICK_SECS, Tick, centres, distance2};
+use super::touched::TILE;
 use crate::bands;
 use crate::rates::Rates;
 use crate::tile::TileGrid;
 use crate::traced::{Mark, TileMarks};
-use crate::wide::{self, F8, M8, Planes, Unit};
+use crate::wide::{self, Around, F8, M8, Offsets, Planes, Unit};
+use crate::{Size, Time};
 
-/// What became of the pixels.
+/// Gathers pictures.
 pub(super) struct Gather {
     /// Whether pixels show means; else each its own best sample as it is.
     means: bool,
-    /// Per pixel when what it shows was traced, [`Time::ZERO`] if nothing is known anywhere, and whether it has a sample of its own.
-    pub(super) marks: Vec<TileMarks>,
     /// Pixels to be traced.
     pub(super) waiting: Waiting,
+    /// Bit by bit for eight pixels of a row: which have a sample at their centre.
+    central: Vec<u8>,
     /// Per pixel the one whose sample it shows: itself, unless it is a hole.
     source: Vec<u32>,
     /// Holes that are not beside samples.
     far: Vec<u32>,
     smooth: Smooth,
+    /// Of each tile.
+    calm: Vec<Calm>,
     /// Of each band of rows.
     found: Vec<Found>,
 }
+
+/// What a picture is gathered from.
+#[derive(Clone, Copy)]
+pub(super) struct Look<'a, F> {
+    pub(super) store: &'a Store,
+    pub(super) now: Time,
+    pub(super) threads: usize,
+    /// Its tiles are eight pixels wide.
+    pub(super) rates: &'a Rates,
+    /// Per tile of these.
+    pub(super) contrast: &'a [f32],
+    /// Samples beside their pixel's centre are to be traced again, where their object rests; so are those at the centre that have been
+    /// carried there, since the camera came to rest only after this time.
+    pub(super) carried: Tick,
+    /// Of an object number; `None`: no sample is to be traced again.
+    pub(super) rests: Option<F>,
+}
+
+/// What the pixels show. Each as it was at the picture before, where it stays.
+pub(super) struct Shown<'a> {
+    pub(super) rgb: &'a mut [[f32; 3]],
+    /// When that was traced, [`Time::ZERO`] if nothing is known anywhere, and whether there is a sample of the pixel's own.
+    pub(super) marks: &'a mut [TileMarks],
+}
+
+/// Of a tile whose pixels all have a sample at their centre, which they show as it is: when the oldest of these was traced.
+type Calm = Option<Tick>;
 
 /// What was found in a band of rows.
 #[derive(Default)]
 struct Found {
     waiting: Waiting,
     far: Vec<u32>,
+    /// Scratch memory.
+    rows: Rows,
+    row: TileRow,
+    lines: [Line; 3],
+}
+
+/// Pixels of a row, with room for eight more than there can be.
+#[derive(Default)]
+struct Line {
+    pixels: Vec<u32>,
+    len: usize,
+}
+
+impl Line {
+    fn begin(&mut self, width: u32) {
+        self.pixels.resize(width as usize + 16, 0);
+        self.len = 0;
+    }
+
+    /// Those of eight whose bit is set.
+    #[inline(always)]
+    fn push<U: Unit>(&mut self, pixels: M8<U>, lanes: u32) {
+        if let Some(room) = self.pixels[self.len..].first_chunk_mut() {
+            *room = pixels.packed(lanes);
+        }
+        self.len += lanes.count_ones() as usize;
+    }
+
+    fn take(&mut self) -> &[u32] {
+        &self.pixels[..std::mem::take(&mut self.len)]
+    }
 }
 
 /// Below this expected error a sample is taken as it is.
@@ -53,75 +116,60 @@ impl Gather {
     pub(super) fn new(means: bool) -> Gather {
         Gather {
             means,
-            marks: Vec::new(),
             waiting: Waiting::default(),
+            central: Vec::new(),
             source: Vec::new(),
             far: Vec::new(),
             smooth: Smooth::default(),
+            calm: Vec::new(),
             found: Vec::new(),
         }
     }
 
-    /// `contrast` per tile of `rates`, whose tiles are eight pixels wide; `shown`: the picture if nothing is known.
-    #[expect(clippy::too_many_arguments)]
-    pub(super) fn run(
-        &mut self,
-        store: &Store,
-        now: Time,
-        threads: usize,
-        rates: &Rates,
-        contrast: &[f32],
-        shown: &[[f32; 3]],
-        picture: &mut Vec<[f32; 3]>,
-    ) {
-        let pixels = store.layout.size.pixels();
-        picture.resize(pixels, [0.0; 3]);
-        self.marks.resize(rates.grid.len(), TileMarks::UNKNOWN);
-        self.source.resize(pixels, fill::NOBODY);
+    /// [`Look::store`] is as if untouched afterwards.
+    pub(super) fn run<F>(&mut self, look: Look<'_, F>, shown: Shown<'_>)
+    where
+        F: Fn(u32) -> bool + Copy + Send + Sync,
+    {
+        let (size, threads) = (look.store.layout.size, look.threads);
+        let prior = mean_of(shown.rgb);
+        self.source.resize(size.pixels(), fill::NOBODY);
         self.far.clear();
         self.waiting.clear();
-        let [red, green, blue] = store.rgb.each_ref().map(Vec::as_slice);
-        let model = Model {
-            samples: Planes::new([&store.px[0], &store.px[1], red, green, blue]),
-            marks: Planes::new([&store.object, &store.tick]),
-            store,
-            now: Tick::of(now),
-            rates,
-            contrast,
-        };
-        let cells = &Cells::new(&store.layout);
-        let size = store.layout.size;
+        let columns = size.width.div_ceil(TILE) as usize;
+        self.central.resize(columns * size.height as usize, 0);
+        self.calm.resize(columns * size.height.div_ceil(TILE) as usize, None);
+        let cells = &[0, 1, 2].map(|turn| Cells::new(&look.store.layout, turn));
         let rows = bands::rows(size.height, threads);
         let band = rows as usize * size.width as usize;
         self.found.resize_with(size.height.div_ceil(rows) as usize, Found::default);
-        let means = self.means;
-        // Bands are of whole tiles, but for the last.
-        let tiles = rows.div_ceil(8) as usize * rates.grid.columns as usize;
-        let bands = picture
+        let (means, tiles) = (self.means, columns * rows.div_ceil(TILE) as usize);
+        let bands = shown
+            .rgb
             .chunks_mut(band)
-            .zip(self.marks.chunks_mut(tiles))
+            .zip(shown.marks.chunks_mut(tiles))
             .zip(self.source.chunks_mut(band))
-            .zip(&mut self.found)
-            .zip((0..size.height).step_by(rows as usize));
-        let bands = bands.map(|((((picture, marks), source), found), first_row)| {
-            let first = size.index(0, first_row);
-            let first_tile = (first_row / 8 * rates.grid.columns) as usize;
-            Blocks { model, cells, means, first, first_tile, picture, marks, source, found }
+            .zip(self.central.chunks_mut(columns * rows as usize))
+            .zip(self.calm.chunks_mut(tiles))
+            .zip(&mut self.found);
+        let bands = (0u32..).step_by(rows as usize).zip(bands).map(|(first_row, band)| {
+            let (((((rgb, marks), source), central), calm), found) = band;
+            let shown = Shown { rgb, marks };
+            Blocks { look, cells, means, first_row, shown, source, central, calm, found }
         });
         bands::run(threads, bands.collect(), wide::run);
         for found in &mut self.found {
             self.waiting.append(&mut found.waiting);
             self.far.append(&mut found.far);
         }
-        self.fill_far(&rates.grid, shown, picture);
+        self.fill_far(&look.rates.grid, prior, shown);
     }
 
-    fn fill_far(&mut self, grid: &TileGrid, shown: &[[f32; 3]], picture: &mut [[f32; 3]]) {
+    /// `prior`: what is shown where next to nothing is known.
+    fn fill_far(&mut self, grid: &TileGrid, prior: [f32; 3], shown: Shown<'_>) {
         let size = grid.size;
-        if self.far.len() == size.pixels() {
-            picture.copy_from_slice(shown);
-        } else {
-            self.smooth.run(size, &self.far, &self.source, mean_of(shown), picture);
+        if self.far.len() < size.pixels() {
+            self.smooth.run(size, &self.far, &self.source, prior, shown.rgb);
         }
         fill::nearest(size, &self.far, &mut self.source);
         for &pixel in &self.far {
@@ -129,142 +177,194 @@ impl Gather {
                 fill::NOBODY => Mark::default(),
                 source => {
                     let place = grid.place(source);
-                    Mark(self.marks[place.tile()].0[place.within()])
+                    Mark(shown.marks[place.tile()].0[place.within()])
                 }
             };
             let place = grid.place(pixel);
-            self.marks[place.tile()].0[place.within()] = mark.of_unknown().0;
+            shown.marks[place.tile()].0[place.within()] = mark.of_unknown().0;
         }
     }
 
-    /// After a picture: samples beside their pixel's centre are to be traced again, where their object `rests`; so are those at the centre
-    /// that have been carried there, since the camera came to rest only after `carried`.
-    pub(super) fn find_off_centre(
-        &mut self,
-        store: &Store,
-        carried: Tick,
-        threads: usize,
-        rests: impl Fn(u32) -> bool + Sync,
-    ) {
-        let height = store.layout.size.height;
-        let band = bands::rows(height, threads);
-        let firsts = (0..height).step_by(band as usize);
-        let bands = self.found.iter_mut().zip(firsts).map(|(found, first)| {
-            let rows = first..(first + band).min(height);
-            OffCentre { store, rows, carried, rests: &rests, waiting: &mut found.waiting }
-        });
-        bands::run(threads, bands.collect(), wide::run);
-        self.found.iter_mut().for_each(|found| self.waiting.append(&mut found.waiting));
+    /// Row by row, bit by bit for eight pixels at a time: which have a sample at their centre.
+    pub(super) fn central(&self) -> &[u8] {
+        &self.central
     }
 }
 
-/// Of every so manieth pixel: in what is shown far from everything that is known, details do not count.
-fn mean_of(shown: &[[f32; 3]]) -> [f32; 3] {
-    let few = shown.iter().step_by(31);
-    let count = few.len() as f32;
-    few.fold([0.0; 3], |sum, c| std::array::from_fn(|k| sum[k] + c[k])).map(|sum| sum / count)
-}
+/// Rows of cells, as columns of numbers: of those of one row of pixels, and of the rows above and below it.
+///
+/// Column and row in the picture, the bits of the object's number, the bits of the tick, red, green, blue.
+#[derive(Default)]
+struct Rows([Vec<f32>; 7]);
 
-struct OffCentre<'a, F> {
-    store: &'a Store,
-    rows: Range<u32>,
-    carried: Tick,
-    rests: &'a F,
-    waiting: &'a mut Waiting,
-}
+/// So many rows of pixels are there at a time, turn by turn.
+const ROWS: usize = 3;
 
-impl<F: Fn(u32) -> bool> wide::Task for OffCentre<'_, F> {
+impl Rows {
+    fn fit(&mut self, layout: &Layout) {
+        let len = ROWS * layout.subs() * layout.stride;
+        self.0.iter_mut().for_each(|plane| plane.resize(len, 0.0));
+    }
+
+    /// Reads the row of pixels `y`, instead of the one that was there three rows before. −1 and the height are the border. `wanted`: of
+    /// eights of cells.
     #[inline(always)]
-    fn run<U: Unit>(self) {
-        let OffCentre { store, rows, carried, rests, waiting } = self;
-        let Layout { size, plane, .. } = store.layout;
-        for y in rows {
-            for x in (0..size.width).step_by(8) {
-                let first = store.layout.of_pixel(x as i32, y as i32);
-                let (mut known, mut central) = (M8::<U>::splat(0), M8::splat(0));
-                for sub in 0..store.layout.subs() {
-                    let i = first + sub * plane;
-                    let is_sample = M8::load(&store.object, i).equals(M8::splat(EMPTY)).not();
-                    known = known.either(is_sample);
-                    let since = M8::load(&store.tick, i).minus(M8::splat(carried.0));
-                    let is_traced = M8::splat(0).less_than(since);
-                    central = central.either(store.are_central(i, x, y).and(is_traced));
+    fn read<U: Unit>(&mut self, store: &Store, y: i32, wanted: &[bool]) {
+        let Layout { stride, plane, .. } = store.layout;
+        let turn = (y + 1) as usize % ROWS;
+        for sub in 0..store.layout.subs() {
+            let from = store.layout.row(y) + sub * plane;
+            let to = (turn * store.layout.subs() + sub) * stride;
+            let (objects, _) = store.object[from..from + stride].as_chunks::<8>();
+            let (records, _) = store.record[from..from + stride].as_chunks::<8>();
+            let eights = objects.iter().zip(records).zip(wanted).zip((to..).step_by(8));
+            for (((objects, records), _), at) in eights.filter(|((_, wanted), _)| **wanted) {
+                let [x, y, _, tick, r, g, b, _] = F8::<U>::columns(store::rows_of(records));
+                let object = M8::load(objects, 0).as_f32();
+                for (column, plane) in [x, y, object, tick, r, g, b].iter().zip(&mut self.0) {
+                    column.store(plane, at);
                 }
-                // Cells beyond the border are empty.
-                known.and(central.not()).for_each(|lane| {
-                    let x = x + lane as u32;
-                    if store.newest(x, y).is_some_and(|cell| rests(store.object[cell])) {
-                        waiting.push(size.index(x, y), x, y, Hole::OffCentre);
-                    }
-                });
             }
         }
     }
 }
 
-/// From the first cell of a pixel to others.
+/// Cells around the first cell of a pixel, in [`Rows`].
 struct Cells {
-    own: Vec<isize>,
+    /// Where the cells of the row begin.
+    row: usize,
+    own: Offsets,
     /// Those of the 3×3 pixels around, and whether they are at most one cell away: all bits, or none.
-    around: Vec<(isize, u32)>,
-    /// First cells of the pixels [`AROUND`].
-    pixels: [isize; 8],
+    around: Offsets,
+    are_near: Vec<u32>,
+    /// Cells of the pixels [`AROUND`], one pixel after the other.
+    pixels: Offsets,
+    /// To these, in pixels, modulo 2³².
+    to_pixels: [u32; AROUND.len()],
+    /// With one cell per pixel, of each of `around`: its place in [`AROUND`], beyond which the pixel itself is, and the way to it.
+    beside: Vec<(u32, u32)>,
 }
 
 impl Cells {
-    fn new(layout: &Layout) -> Cells {
+    /// `turn`: that of the pixel's row.
+    fn new(layout: &Layout, turn: usize) -> Cells {
         let n = layout.per_side as i32;
-        let here = layout.of_pixel(0, 0) as isize;
-        let to = |dx, dy| layout.neighbour(0, 0, dx, dy) as isize - here;
-        let square = |cells: std::ops::Range<i32>| {
-            cells.clone().flat_map(move |dy| cells.clone().map(move |dx| (dx, dy)))
+        let row = |turn: usize| turn % ROWS * layout.subs() * layout.stride;
+        let to = |dx: i32, dy: i32| {
+            let [(x, sub_x), (y, sub_y)] = [dx, dy].map(|d| (d.div_euclid(n), d.rem_euclid(n)));
+            let below = turn + (y + ROWS as i32) as usize;
+            let cell = row(below) + (sub_y * n + sub_x) as usize * layout.stride;
+            cell as isize + x as isize - row(turn) as isize
         };
+        let square = |columns: Range<i32>, rows: Range<i32>| {
+            rows.flat_map(move |dy| columns.clone().map(move |dx| (dx, dy)))
+        };
+        let offsets = |cells: &[(i32, i32)]| Offsets::new(cells.iter().map(|c| to(c.0, c.1)));
+        let pixel = |[dx, dy]: [i32; 2]| {
+            let [columns, rows] = [dx, dy].map(|d| n * d..n * (d + 1));
+            square(columns, rows).collect::<Vec<_>>()
+        };
+        let around: Vec<(i32, i32)> = square(-n..2 * n, -n..2 * n).collect();
         let is_near = |d: i32| -1 <= d && d <= n;
-        let mask = |dx, dy| u32::from(is_near(dx) && is_near(dy)).wrapping_neg();
+        let mask = |&(dx, dy): &(i32, i32)| u32::from(is_near(dx) && is_near(dy)).wrapping_neg();
+        let to_pixel = |[dx, dy]: [i32; 2]| (dy * layout.size.width as i32 + dx) as u32;
+        let place = |dx, dy| {
+            let place = AROUND.iter().position(|&to| to == [dx, dy]);
+            place.unwrap_or(AROUND.len()) as u32
+        };
         Cells {
-            own: square(0..n).map(|(dx, dy)| to(dx, dy)).collect(),
-            around: square(-n..2 * n).map(|(dx, dy)| (to(dx, dy), mask(dx, dy))).collect(),
-            pixels: AROUND.map(|[dx, dy]| to(n * dx, n * dy)),
+            row: row(turn),
+            own: offsets(&pixel([0, 0])),
+            are_near: around.iter().map(mask).collect(),
+            around: offsets(&around),
+            pixels: offsets(&AROUND.map(pixel).concat()),
+            to_pixels: AROUND.map(to_pixel),
+            beside: around.iter().map(|&(dx, dy)| (place(dx, dy), to_pixel([dx, dy]))).collect(),
         }
     }
 }
 
 /// The expected error of samples.
 #[derive(Clone, Copy)]
-struct Model<'a> {
-    /// Column, row, red, green, blue.
-    samples: Planes<'a, f32, 5>,
-    /// Object, tick.
-    marks: Planes<'a, u32, 2>,
-    store: &'a Store,
-    now: Tick,
-    rates: &'a Rates,
-    contrast: &'a [f32],
+struct Model<U: Unit> {
+    now: M8<U>,
+    /// The tile's learned rate of change, and its contrast.
+    v: F8<U>,
+    s: F8<U>,
+    /// ε: so that a sample at the very centre does not weigh everything.
+    floor: F8<U>,
 }
 
-/// The pixels of a band of rows, eight at a time.
-struct Blocks<'a> {
-    model: Model<'a>,
+impl<U: Unit> Model<U> {
+    #[inline(always)]
+    fn new(now: Tick, v: f32, s: f32) -> Self {
+        let floor = F8::splat(1e-4 * s + 2e-6);
+        Model { now: M8::splat(now.0), v: F8::splat(v), s: F8::splat(s), floor }
+    }
+
+    #[inline(always)]
+    fn error(&self, distance2: F8<U>, tick: M8<U>) -> F8<U> {
+        let age_secs = self.now.minus(tick).to_f32() * F8::splat(TICK_SECS);
+        self.v * age_secs + self.s * distance2
+    }
+}
+
+/// Rows that are looked at.
+#[derive(Clone, Copy)]
+struct Near<'a> {
+    /// As in [`Rows`].
+    samples: Planes<'a, f32, 7>,
     cells: &'a Cells,
+}
+
+/// A band of rows, eight pixels at a time.
+struct Blocks<'a, F> {
+    look: Look<'a, F>,
+    /// By the turn of a row.
+    cells: &'a [Cells; ROWS],
     means: bool,
-    /// The band's first pixel, and its first tile.
-    first: u32,
-    first_tile: usize,
-    /// Of the band's pixels, as all below.
-    picture: &'a mut [[f32; 3]],
-    marks: &'a mut [TileMarks],
+    first_row: u32,
+    /// Of the band's pixels, eights and tiles, as all below.
+    shown: Shown<'a>,
     source: &'a mut [u32],
+    central: &'a mut [u8],
+    calm: &'a mut [Calm],
     found: &'a mut Found,
+}
+
+/// What is to be done in a row of tiles.
+#[derive(Default)]
+struct TileRow {
+    /// Of the tiles: those that have to be gathered again.
+    todo: Vec<bool>,
+    /// Of eights of cells: those that are needed for that.
+    wanted: Vec<bool>,
+    /// The same of the row of tiles before, if its last rows are still there.
+    before: Vec<bool>,
 }
 
 /// Eight pixels in a row of one tile.
 struct Eight<U: Unit> {
-    /// The first cell of the first one.
+    x: u32,
+    y: u32,
+    /// The first cell of the first one, in [`Rows`].
     first: usize,
     centre: [F8<U>; 2],
-    /// The tile's learned rate of change, and its contrast.
-    v: F8<U>,
-    s: F8<U>,
+    model: Model<U>,
+}
+
+/// What is around eight pixels that have no samples.
+struct AroundHoles<U: Unit> {
+    /// The object of the sample nearest to the centre; [`EMPTY`] where there is none.
+    object: M8<U>,
+    /// How many pixels beside it have samples, negative.
+    count: M8<U>,
+    /// Whether any has.
+    any: M8<U>,
+    /// To the first of them in the order of [`AROUND`], in pixels.
+    offset: M8<U>,
+    /// When the newest sample of that was traced.
+    tick: M8<U>,
 }
 
 /// What eight pixels show.
@@ -276,151 +376,306 @@ struct Seen<U: Unit> {
     error: F8<U>,
     /// When the pixel's newest sample was traced.
     tick: M8<U>,
+    /// Whether there is a sample at the pixel's centre, and one that was traced there.
+    central: M8<U>,
+    traced: M8<U>,
 }
 
-impl wide::Task for Blocks<'_> {
+impl<F: Fn(u32) -> bool> wide::Task for Blocks<'_, F> {
     #[inline(always)]
     fn run<U: Unit>(mut self) {
-        let size = self.model.store.layout.size;
-        let columns = self.model.rates.grid.columns;
-        let (first, rows) = (self.first / size.width, self.picture.len() as u32 / size.width);
-        for y in first..first + rows {
-            for x in (0..size.width).step_by(8) {
-                self.block::<U>(x, y, (y / 8 * columns + x / 8) as usize);
+        let Size { width, height } = self.look.store.layout.size;
+        let last = self.first_row + self.shown.rgb.len() as u32 / width;
+        let mut near = std::mem::take(&mut self.found.rows);
+        let mut row = std::mem::take(&mut self.found.row);
+        near.fit(&self.look.store.layout);
+        row.begin(width.div_ceil(TILE) as usize);
+        self.found.lines.iter_mut().for_each(|line| line.begin(width));
+        for y in (self.first_row..last.min(height)).step_by(TILE as usize) {
+            if row.find(&self, y / TILE) {
+                self.tile_row::<U>(&mut near, &row, y, last.min(y + TILE));
             }
         }
+        (self.found.rows, self.found.row) = (near, row);
     }
 }
 
-impl Blocks<'_> {
-    #[inline(always)]
-    fn block<U: Unit>(&mut self, x: u32, y: u32, tile: usize) {
-        let Model { store, rates, contrast, .. } = self.model;
-        let size = store.layout.size;
-        let eight = Eight::<U> {
-            first: store.layout.of_pixel(x as i32, y as i32),
-            centre: centres(x, y),
-            v: F8::splat(rates.of_tile(tile)),
-            s: F8::splat(contrast[tile]),
-        };
-        let mut seen = self.model.own(&eight, self.cells);
-        let empty = M8::splat(EMPTY);
-        let lanes = 8.min((size.width - x) as usize);
-        let holes = seen.object.equals(empty).and(M8::first_lanes(lanes));
-        if holes.any() {
-            seen.object = self.model.nearest(&eight, self.cells).or(holes, seen.object);
-        }
-        let exact = match self.means {
-            true => seen.error.less_than(F8::splat(EXACT)),
-            false => holes.not(),
-        };
-        if !exact.either(seen.object.equals(empty)).all() {
-            let mean = self.model.mean(&eight, self.cells, seen.object, holes);
-            seen.rgb = F8::all_or(seen.rgb, exact, mean);
-        }
-        let start = size.index(x, y);
-        let [r, g, b] = seen.rgb;
-        let rgb = [r.lanes(), g.lanes(), b.lanes()];
-        let in_band = (start - self.first) as usize;
-        let pixels = in_band..in_band + lanes;
-        let picture = &mut self.picture[pixels.clone()];
-        let source = &mut self.source[pixels];
-        for lane in 0..lanes {
-            picture[lane] = [rgb[0][lane], rgb[1][lane], rgb[2][lane]];
-            source[lane] = start + lane as u32;
-        }
-        // A mask is −1 where it is set.
-        let marks = seen.tick.plus(seen.tick).minus(holes);
-        let tile = tile - self.first_tile;
-        marks.store(&mut self.marks[tile].0, (y % 8 * 8) as usize);
-        if holes.any() {
-            self.note_holes(&eight, holes, [x, y], tile);
+impl TileRow {
+    fn begin(&mut self, tiles: usize) {
+        self.todo.resize(tiles, false);
+        for eights in [&mut self.wanted, &mut self.before] {
+            eights.clear();
+            eights.resize(tiles + 1, false);
         }
     }
 
-    /// How well holes can be guessed, and whose sample they show.
+    /// Whether anything is to be done in row `row` of tiles.
+    fn find<F>(&mut self, blocks: &Blocks<'_, F>, row: u32) -> bool {
+        std::mem::swap(&mut self.wanted, &mut self.before);
+        self.wanted.fill(false);
+        let (columns, mut any) = (self.todo.len(), false);
+        for column in 0..columns {
+            let is_todo = !blocks.stays(row, column as u32);
+            self.todo[column] = is_todo;
+            self.wanted[column] |= is_todo;
+            self.wanted[column + 1] = is_todo;
+            any |= is_todo;
+        }
+        any
+    }
+
+    /// Whether all that is wanted of the two rows above has been read.
+    fn is_there(&self) -> bool {
+        self.wanted.iter().zip(&self.before).all(|(wanted, before)| *before || !wanted)
+    }
+}
+
+impl<F> Blocks<'_, F> {
+    /// Whether a tile goes on showing what it shows.
+    fn stays(&self, row: u32, column: u32) -> bool {
+        let Look { store, now, rates, contrast, .. } = self.look;
+        let tile = (row * rates.grid.columns + column) as usize;
+        let first_tile = (self.first_row / TILE * rates.grid.columns) as usize;
+        let Some(oldest) = self.calm[tile - first_tile] else { return false };
+        // No error is larger than this: it is rounded like this one.
+        let age_secs = Tick::of(now).0.wrapping_sub(oldest.0) as i32 as f32 * TICK_SECS;
+        let most = rates.of_tile(tile) * age_secs + contrast[tile] * (CENTRAL_PX * CENTRAL_PX);
+        most < EXACT && !store.touched.is_near(row, column)
+    }
+}
+
+impl<F: Fn(u32) -> bool> Blocks<'_, F> {
+    /// Rows `y` to `last` of a row of tiles.
+    #[inline(always)]
+    fn tile_row<U: Unit>(&mut self, near: &mut Rows, row: &TileRow, y: u32, last: u32) {
+        let Look { store, now, rates, contrast, .. } = self.look;
+        let first_tile = (y / TILE * rates.grid.columns) as usize;
+        let in_band = ((y - self.first_row) / TILE * rates.grid.columns) as usize;
+        if !row.is_there() {
+            near.read::<U>(store, y as i32 - 1, &row.wanted);
+            near.read::<U>(store, y as i32, &row.wanted);
+        }
+        for y in y..last {
+            near.read::<U>(store, y as i32 + 1, &row.wanted);
+            let samples = Planes::new(near.0.each_ref().map(Vec::as_slice));
+            let near = Near { samples, cells: &self.cells[(y + 1) as usize % ROWS] };
+            for column in (0..row.todo.len()).filter(|&column| row.todo[column]) {
+                let (x, tile) = (column as u32 * TILE, first_tile + column);
+                let eight = Eight::<U> {
+                    x,
+                    y,
+                    first: near.cells.row + x as usize + 1,
+                    centre: centres(x, y),
+                    model: Model::new(Tick::of(now), rates.of_tile(tile), contrast[tile]),
+                };
+                let oldest = self.block(&near, &eight);
+                let calm = &mut self.calm[in_band + column];
+                let before = if y % TILE == 0 { oldest } else { *calm };
+                *calm = before.zip(oldest).map(|(a, b)| if a.is_later_than(b) { b } else { a });
+            }
+            let Found { waiting, far, lines: [large, small, others], .. } = &mut *self.found;
+            waiting.push(Hole::Large, large.take());
+            waiting.push(Hole::Small, small.take());
+            far.extend_from_slice(others.take());
+        }
+    }
+
+    #[inline(always)]
+    fn block<U: Unit>(&mut self, near: &Near<'_>, eight: &Eight<U>) -> Calm {
+        let Layout { size, per_side, .. } = self.look.store.layout;
+        let mut seen = near.own(eight, self.look.carried);
+        let empty = M8::splat(EMPTY);
+        let lanes = 8.min((size.width - eight.x) as usize);
+        let inside = M8::first_lanes(lanes);
+        let holes = seen.object.equals(empty).and(inside);
+        let object = seen.object;
+        let mut source = M8::new([0, 1, 2, 3, 4, 5, 6, 7]);
+        source = source.plus(M8::splat(size.index(eight.x, eight.y)));
+        if holes.any() {
+            let around = near.around_holes(eight);
+            seen.object = around.object.or(holes, seen.object);
+            seen.tick = around.tick.or(holes, seen.tick);
+            source = self.note_holes(source, holes, &around);
+        }
+        let good = seen.error.less_than(F8::splat(EXACT));
+        let exact = if self.means { good } else { holes.not() };
+        if !exact.either(seen.object.equals(empty)).all() {
+            let mean = near.mean(eight, seen.object, holes);
+            seen.rgb = F8::all_or(seen.rgb, exact, mean);
+        }
+        self.show(eight, &seen, source, holes, lanes);
+        if !seen.traced.either(inside.not()).all() {
+            self.note_off_centre(eight, object.equals(empty).not().and(seen.traced.not()));
+            return None;
+        }
+        let is_calm = per_side == 1 && good.either(inside.not()).all();
+        is_calm.then(|| eight.oldest(seen.tick, lanes))
+    }
+
+    #[inline(always)]
+    fn show<U: Unit>(
+        &mut self,
+        eight: &Eight<U>,
+        seen: &Seen<U>,
+        source: M8<U>,
+        holes: M8<U>,
+        lanes: usize,
+    ) {
+        let size = self.look.store.layout.size;
+        let in_band = size.index(eight.x, eight.y) - self.first_row * size.width;
+        let pixels = in_band as usize..in_band as usize + lanes;
+        let (mut rgb, room) = (F8::triples(seen.rgb), &mut self.shown.rgb[pixels.clone()]);
+        // What nothing is known of goes on showing what it has shown, until the larger holes are filled.
+        let far = source.equals(M8::splat(fill::NOBODY)).and(holes);
+        far.for_each(|lane| rgb[lane] = room[lane]);
+        put(room, &rgb);
+        put(&mut self.source[pixels], &source.lanes());
+        let columns = size.width.div_ceil(TILE);
+        let eights = (eight.y - self.first_row) * columns + eight.x / TILE;
+        self.central[eights as usize] = seen.central.bits() as u8;
+        // A mask is −1 where it is set.
+        let marks = seen.tick.plus(seen.tick).minus(holes);
+        let tile = (eight.y - self.first_row) / TILE * columns + eight.x / TILE;
+        marks.store(&mut self.shown.marks[tile as usize].0, (eight.y % TILE * TILE) as usize);
+    }
+
+    /// Holes wait to be traced: those that can be guessed well, and those that cannot. Returns whose samples `pixels` show.
     #[inline(always)]
     fn note_holes<U: Unit>(
         &mut self,
-        eight: &Eight<U>,
+        pixels: M8<U>,
         holes: M8<U>,
-        [x, y]: [u32; 2],
-        tile: usize,
-    ) {
-        let Model { store, .. } = self.model;
-        let size = store.layout.size;
-        let (mut nearest, mut known) = (M8::<U>::splat(AROUND.len() as u32), M8::splat(0));
-        for (k, &offset) in self.cells.pixels.iter().enumerate().rev() {
-            let first = eight.first.wrapping_add_signed(offset);
-            let is_known = self.model.are_known(first, self.cells);
-            nearest = M8::splat(k as u32).or(is_known, nearest);
-            // A mask is −1 where it is set.
-            known = known.plus(is_known);
+        around: &AroundHoles<U>,
+    ) -> M8<U> {
+        // A mask is −1 where it is set.
+        let large = M8::splat(-4i32 as u32).less_than(around.count).and(holes).bits();
+        let far = around.any.not().and(holes);
+        let [to_large, to_small, to_far] = &mut self.found.lines;
+        to_large.push(pixels, large);
+        to_small.push(pixels, holes.bits() & !large);
+        if far.any() {
+            to_far.push(pixels, far.bits());
         }
-        let (nearest, known) = (nearest.lanes(), known.lanes());
-        let row = (y % 8 * 8) as usize;
-        holes.for_each(|lane| {
-            let x = x + lane as u32;
-            let pixel = size.index(x, y);
-            let in_band = (pixel - self.first) as usize;
-            let hole = if known[lane] as i32 <= -4 { Hole::Small } else { Hole::Large };
-            self.found.waiting.push(pixel, x, y, hole);
-            let Some([dx, dy]) = AROUND.get(nearest[lane] as usize) else {
-                self.source[in_band] = fill::NOBODY;
-                self.found.far.push(pixel);
-                return;
-            };
-            let (x, y) = (x.wrapping_add_signed(*dx), y.wrapping_add_signed(*dy));
-            self.source[in_band] = size.index(x, y);
-            if let Some(i) = store.newest(x, y) {
-                let mark = Mark::of_tick(store.tick[i]).of_unknown();
-                self.marks[tile].0[row + lane] = mark.0;
+        M8::splat(fill::NOBODY).or(far, pixels.plus(around.offset.and(holes)))
+    }
+
+    /// Those of the pixels whose object rests.
+    #[inline(always)]
+    fn note_off_centre<U: Unit>(&mut self, eight: &Eight<U>, pixels: M8<U>) {
+        let Look { store, rests: Some(rests), .. } = &self.look else { return };
+        // Cells beyond the border are empty.
+        pixels.for_each(|lane| {
+            let (x, y) = (eight.x + lane as u32, eight.y);
+            if store.newest(x, y).is_some_and(|cell| rests(store.object[cell])) {
+                self.found.waiting.push(Hole::OffCentre, &[store.layout.size.index(x, y)]);
             }
         });
     }
 }
 
-impl Model<'_> {
+impl<U: Unit> Seen<U> {
+    /// Samples as in [`Rows`].
     #[inline(always)]
-    fn errors<U: Unit>(&self, px: [F8<U>; 2], tick: M8<U>, eight: &Eight<U>) -> F8<U> {
-        let age_secs = M8::splat(self.now.0).minus(tick).to_f32() * F8::splat(TICK_SECS);
-        eight.v * age_secs + eight.s * distance2(px, &eight.centre)
+    fn new(samples: [F8<U>; 7], eight: &Eight<U>, carried: Tick) -> Self {
+        let [x, y, object, tick, rgb @ ..] = samples;
+        let (object, tick) = (object.to_bits(), tick.to_bits());
+        let (none, empty) = (M8::splat(0), M8::splat(EMPTY));
+        let distance2 = distance2([x, y], &eight.centre);
+        let is_sample = object.equals(empty).not();
+        let central = distance2.less_than(F8::splat(CENTRAL_PX * CENTRAL_PX)).and(is_sample);
+        let is_later = none.less_than(tick.minus(M8::splat(carried.0)));
+        let error = eight.model.error(distance2, tick);
+        Seen {
+            rgb: F8::all_or(rgb, is_sample, [F8::splat(0.0); 3]),
+            object,
+            error: error.or(is_sample, F8::splat(f32::MAX)),
+            tick: tick.and(is_sample),
+            central,
+            traced: central.and(is_later),
+        }
     }
 
+    /// With others of the same pixels.
+    #[inline(always)]
+    fn join(&mut self, other: &Self) {
+        let (none, empty) = (M8::splat(0), M8::splat(EMPTY));
+        let is_first = self.object.equals(empty);
+        let is_newer = none.less_than(other.tick.minus(self.tick)).either(is_first);
+        self.tick = other.tick.or(is_newer.and(other.object.equals(empty).not()), self.tick);
+        let better = other.error.less_than(self.error);
+        self.error = other.error.or(better, self.error);
+        self.object = other.object.or(better, self.object);
+        self.rgb = F8::all_or(other.rgb, better, self.rgb);
+        self.central = self.central.either(other.central);
+        self.traced = self.traced.either(other.traced);
+    }
+}
+
+impl<U: Unit> Eight<U> {
+    /// The earliest of the first `lanes` ticks.
+    #[inline(always)]
+    fn oldest(&self, ticks: M8<U>, lanes: usize) -> Tick {
+        let now = self.model.now.lanes()[0];
+        let ages = self.model.now.minus(ticks).lanes();
+        Tick(now.wrapping_sub(ages[..lanes].iter().copied().max().unwrap_or(0)))
+    }
+}
+
+impl Near<'_> {
     /// The pixels' own samples with the least expected error.
     #[inline(always)]
-    fn own<U: Unit>(&self, eight: &Eight<U>, cells: &Cells) -> Seen<U> {
-        let mut seen = Seen {
-            rgb: [F8::splat(0.0); 3],
-            object: M8::splat(EMPTY),
-            error: F8::splat(f32::MAX),
-            tick: M8::splat(0),
-        };
-        for &offset in &cells.own {
-            let i = eight.first.wrapping_add_signed(offset);
-            let [x, y, rgb @ ..] = self.samples.load(i);
-            let [object, tick] = self.marks.load(i);
-            let error = self.errors([x, y], tick, eight);
-            let is_sample = object.equals(M8::splat(EMPTY)).not();
-            let is_first = seen.object.equals(M8::splat(EMPTY));
-            let is_newer = M8::splat(0).less_than(tick.minus(seen.tick));
-            seen.tick = tick.or(is_sample.and(is_first.either(is_newer)), seen.tick);
-            let better = error.less_than(seen.error).and(is_sample);
-            seen.error = error.or(better, seen.error);
-            seen.object = object.or(better, seen.object);
-            seen.rgb = F8::all_or(rgb, better, seen.rgb);
+    fn own<U: Unit>(&self, eight: &Eight<U>, carried: Tick) -> Seen<U> {
+        let own = self.samples.around(eight.first, &self.cells.own);
+        let mut seen = Seen::new(own.load(0), eight, carried);
+        for k in 1..own.len() {
+            seen.join(&Seen::new(own.load(k), eight, carried));
         }
         seen
     }
 
+    /// What is around the pixels, those that have no samples.
+    #[inline(always)]
+    fn around_holes<U: Unit>(&self, eight: &Eight<U>) -> AroundHoles<U> {
+        if self.cells.own.len() > 1 {
+            return AroundHoles { object: self.nearest(eight), ..self.beside(eight) };
+        }
+        let (none, empty) = (M8::splat(0), M8::splat(EMPTY));
+        let mut found =
+            AroundHoles { object: empty, count: none, any: none, offset: none, tick: none };
+        let (mut least, mut first) = (F8::splat(f32::INFINITY), M8::splat(AROUND.len() as u32));
+        let around = self.samples.around(eight.first, &self.cells.around);
+        for (k, &(nth, to_pixel)) in self.cells.beside.iter().enumerate() {
+            // Nothing is in the pixels themselves.
+            if nth == AROUND.len() as u32 {
+                continue;
+            }
+            let [x, y, object, tick, ..] = around.load(k);
+            let object = object.to_bits();
+            let is_sample = object.equals(empty).not();
+            found.count = found.count.plus(is_sample);
+            let distance2 = distance2([x, y], &eight.centre);
+            let nearer = distance2.less_than(least).and(is_sample);
+            least = distance2.or(nearer, least);
+            found.object = object.or(nearer, found.object);
+            let nth = M8::splat(nth);
+            let is_first = nth.less_than(first).and(is_sample);
+            first = nth.or(is_first, first);
+            found.offset = M8::splat(to_pixel).or(is_first, found.offset);
+            found.tick = tick.to_bits().or(is_first, found.tick);
+        }
+        found.any = first.less_than(M8::splat(AROUND.len() as u32));
+        found
+    }
+
     /// The objects of the samples nearest to the centres of holes; [`EMPTY`] where there is none around.
     #[inline(always)]
-    fn nearest<U: Unit>(&self, eight: &Eight<U>, cells: &Cells) -> M8<U> {
+    fn nearest<U: Unit>(&self, eight: &Eight<U>) -> M8<U> {
         let mut least = F8::splat(f32::INFINITY);
         let mut nearest = M8::splat(EMPTY);
-        for &(offset, _) in &cells.around {
-            let i = eight.first.wrapping_add_signed(offset);
-            let ([x, y, ..], [object, _]) = (self.samples.load(i), self.marks.load(i));
+        let around = self.samples.around(eight.first, &self.cells.around);
+        for k in 0..around.len() {
+            let [x, y, object, ..] = around.load(k);
+            let object = object.to_bits();
             let is_sample = object.equals(M8::splat(EMPTY)).not();
             let distance2 = distance2([x, y], &eight.centre);
             let nearer = distance2.less_than(least).and(is_sample);
@@ -432,22 +687,16 @@ impl Model<'_> {
 
     /// Over the objects' samples: those in the pixel's cells and one further around, for holes in the 3×3 pixels around.
     #[inline(always)]
-    fn mean<U: Unit>(
-        &self,
-        eight: &Eight<U>,
-        cells: &Cells,
-        object: M8<U>,
-        holes: M8<U>,
-    ) -> [F8<U>; 3] {
-        let floor = F8::splat(least_error(eight.s.lanes()[0]));
+    fn mean<U: Unit>(&self, eight: &Eight<U>, object: M8<U>, holes: M8<U>) -> [F8<U>; 3] {
         let zero = F8::splat(0.0);
         let (mut red, mut green, mut blue, mut weights) = (zero, zero, zero, zero);
-        for &(offset, is_near) in &cells.around {
-            let i = eight.first.wrapping_add_signed(offset);
-            let [x, y, r, g, b] = self.samples.load(i);
-            let [other, tick] = self.marks.load(i);
+        let around = self.samples.around(eight.first, &self.cells.around);
+        for (k, &is_near) in self.cells.are_near.iter().enumerate() {
+            let [x, y, other, tick, r, g, b] = around.load(k);
+            let (other, tick) = (other.to_bits(), tick.to_bits());
             let counts = other.equals(object).and(holes.either(M8::splat(is_near)));
-            let error = self.errors([x, y], tick, eight) + floor;
+            let distance2 = distance2([x, y], &eight.centre);
+            let error = eight.model.error(distance2, tick) + eight.model.floor;
             let weight = (F8::splat(1.0) / (error * error)).or(counts, zero);
             weights = weights + weight;
             red = red + weight * r;
@@ -457,20 +706,54 @@ impl Model<'_> {
         [red / weights, green / weights, blue / weights]
     }
 
-    /// Whether the pixels have samples of their own.
+    /// What is known beside the pixels, but for the object.
     #[inline(always)]
-    fn are_known<U: Unit>(&self, first: usize, cells: &Cells) -> M8<U> {
-        let mut known = M8::splat(0);
-        for &offset in &cells.own {
-            let [object, _] = self.marks.load(first.wrapping_add_signed(offset));
-            known = known.either(object.equals(M8::splat(EMPTY)).not());
+    fn beside<U: Unit>(&self, eight: &Eight<U>) -> AroundHoles<U> {
+        let (none, object) = (M8::splat(0), M8::splat(EMPTY));
+        let mut beside = AroundHoles { object, count: none, any: none, offset: none, tick: none };
+        let cells = self.samples.around(eight.first, &self.cells.pixels);
+        let subs = cells.len() / AROUND.len();
+        for (nth, &offset) in self.cells.to_pixels.iter().enumerate() {
+            let (is_known, newest) = newest(&cells, nth * subs..(nth + 1) * subs);
+            let is_first = beside.any.equals(none).and(is_known);
+            beside.offset = beside.offset.either(is_first.and(M8::splat(offset)));
+            beside.tick = beside.tick.either(is_first.and(newest));
+            beside.any = beside.any.either(is_known);
+            // A mask is −1 where it is set.
+            beside.count = beside.count.plus(is_known);
         }
-        known
+        beside
     }
 }
 
-/// ε: so that a sample at the very centre does not weigh everything.
+/// Whether there are samples in some cells of eight pixels, and when the newest were traced.
 #[inline(always)]
-fn least_error(s: f32) -> f32 {
-    1e-4 * s + 2e-6
+fn newest<U: Unit>(cells: &Around<'_, f32, 7>, some: Range<usize>) -> (M8<U>, M8<U>) {
+    let none = M8::splat(0);
+    let (mut is_known, mut newest) = (none, none);
+    for k in some {
+        let [_, _, object, tick, ..] = cells.load(k);
+        let (object, tick) = (object.to_bits(), tick.to_bits());
+        let is_sample = object.equals(M8::splat(EMPTY)).not();
+        let is_newer = none.less_than(tick.minus(newest));
+        newest = tick.or(is_sample.and(is_known.not().either(is_newer)), newest);
+        is_known = is_known.either(is_sample);
+    }
+    (is_known, newest)
+}
+
+/// Of every so manieth pixel: in what is shown far from everything that is known, details do not count.
+fn mean_of(shown: &[[f32; 3]]) -> [f32; 3] {
+    let few = shown.iter().step_by(31);
+    let count = few.len() as f32;
+    few.fold([0.0; 3], |sum, c| std::array::from_fn(|k| sum[k] + c[k])).map(|sum| sum / count)
+}
+
+/// The first of `values`, as many as there is room for: mostly all.
+#[inline(always)]
+fn put<T: Copy>(room: &mut [T], values: &[T; 8]) {
+    match room.first_chunk_mut() {
+        Some(all) => *all = *values,
+        None => room.copy_from_slice(&values[..room.len()]),
+    }
 }

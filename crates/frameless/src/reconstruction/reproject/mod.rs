@@ -19,10 +19,12 @@ mod relight;
 mod residual;
 mod rest;
 mod settle;
+mod shade;
 mod shadows;
 mod smooth;
 mod stage;
 mod store;
+mod touched;
 mod warp;
 
 use super::ReprojectOptions;
@@ -52,6 +54,8 @@ pub struct Reproject {
     /// The picture of the last refresh, and what is needed to find a surface in it.
     shown: Vec<[f32; 3]>,
     shown_at: Time,
+    /// The canvas's generation, and how many samples were wanted.
+    shown_for: (u32, u16),
     display: Display,
     /// Where everything was at the last refresh, and at the one before.
     poses: [Pose; 2],
@@ -88,6 +92,7 @@ impl Reproject {
             drift: Default::default(),
             shown: Vec::new(),
             shown_at: Time::ZERO,
+            shown_for: (0, 0),
             display: Display::default(),
             poses: Default::default(),
             interval_secs: 0.0,
@@ -130,10 +135,6 @@ impl Reproject {
     /// memory would take longer than everything else.
     #[inline(always)]
     fn prefetch(&self, kept: &Kept<'_>, i: usize) {
-        if let Some(request) = kept.requests.get(i + SHADE_AHEAD) {
-            let (x, y) = kept.size.xy(request.pixel);
-            self.store.prefetch_shade(x, y);
-        }
         let Some(&Request { pixel, .. }) = kept.requests.get(i + AHEAD) else { return };
         let Size { width, height } = kept.size;
         let (x, y) = kept.size.xy(pixel);
@@ -146,7 +147,7 @@ impl Reproject {
 
     /// Whoever is in a new sample's cell and moves will be somewhere else at the next refresh.
     fn make_room(&mut self, sample: &store::Sample) {
-        let Some(cell) = self.store.layout.of_px(sample.px) else { return };
+        let Some(cell) = self.store.layout.of_px(sample.record.px()) else { return };
         if self.refreshes >= 2 {
             self.covers.note(&self.store, cell, sample);
             let object = self.store.object[cell];
@@ -168,9 +169,10 @@ impl Reproject {
         if refinement.suspect {
             let (x, y) = kept.size.xy(request.pixel);
             let centre = [x as f32 + 0.5, y as f32 + 0.5];
-            let age_secs = self.store.newest(x, y).map_or(0.0, |cell| {
-                kept.now.secs_since(Tick(self.store.tick[cell]).time(kept.now))
-            });
+            let age_secs = self
+                .store
+                .newest(x, y)
+                .map_or(0.0, |cell| kept.now.secs_since(self.store.tick(cell).time(kept.now)));
             refinement.suspect = age_secs > LONG_SINCE_SECS
                 && self.around(centre).beyond_range(display.encode(rgb)) > 3.0 * residual::OUTDATED;
         }
@@ -180,8 +182,6 @@ impl Reproject {
 
 /// So many samples later what is prefetched is used.
 const AHEAD: usize = 16;
-/// The same of what is found by what was prefetched first.
-const SHADE_AHEAD: usize = 8;
 
 /// A suspect pixel whose centre was traced later than this before is not looked at again: it shows something finer than a pixel.
 const LONG_SINCE_SECS: f64 = 0.05;
@@ -202,7 +202,7 @@ impl Reconstruction for Reproject {
             }
             let mut sample = store::Sample::new(kept, i, display);
             let found = self.residual(&sample, kept, i, display);
-            sample.depth = found.depth;
+            sample.record.set_depth(found.depth);
             self.make_room(&sample);
             self.store.insert(&sample, found.outdated);
             findings.changes.push(found.change);
@@ -253,8 +253,11 @@ impl Reproject {
         if refresh.is_noisy {
             self.settled.hand_over(&mut self.store, refresh.display);
         }
-        if self.refreshes >= 2 && !self.settled.any_rests() {
-            self.carried = Tick::of(refresh.now);
+        if !self.settled.any_rests() {
+            self.store.touched.mark_all();
+            if self.refreshes >= 2 {
+                self.carried = Tick::of(refresh.now);
+            }
         }
         let at_rest = self.refreshes >= 2 && self.poses[0] == self.poses[1];
         if !at_rest || self.warp.has_displaced() {
@@ -285,37 +288,52 @@ impl Reproject {
             self.drift
                 .run(&mut self.store, now, interval_secs, |object| self.settled.rests(object));
         }
-        if let Some(lighting) = refresh.lighting {
+        if let Some(lighting) = refresh.lighting.filter(|_| self.options.relight) {
             self.relight.run(&mut self.store, lighting, &display, refresh.threads);
         }
     }
 
     /// The picture, and what waits to be traced.
-    fn show(&mut self, refresh: &Refresh<'_>, canvas: &Canvas, picture: &mut Vec<[f32; 3]>) {
-        let size = canvas.size();
+    fn show(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas, picture: &mut Vec<[f32; 3]>) {
+        let (size, wanted) = (canvas.size(), self.samples_wanted(refresh));
         let rates = refresh.rates.unwrap_or_else(|| {
-            self.no_rates.get_or_insert_with(|| Rates::new(TileGrid::new(size, 8)))
+            self.no_rates.get_or_insert_with(|| Rates::new(TileGrid::new(size, touched::TILE)))
         });
+        let is_new = (canvas.generation(), wanted);
+        // With noise, pixels show what they borrow from others.
+        if std::mem::replace(&mut self.shown_for, is_new) != is_new || refresh.is_noisy {
+            self.store.touched.mark_all();
+        }
         if self.shown.len() != size.pixels() {
             self.shown = canvas.rgb().iter().map(|&rgb| refresh.display.encode(rgb)).collect();
         }
         tile_contrast(&self.shown, &rates.grid, &mut self.contrast);
-        let (now, threads) = (refresh.now, refresh.threads);
-        let (store, contrast) = (&self.store, &self.contrast);
-        self.gather.run(store, now, threads, rates, contrast, &self.shown, picture);
-        self.doubt(size, now);
+        let mut marks = canvas.lend();
         let recentres = self.options.without != Some(ReprojectStage::Recentre);
-        if recentres && self.settled.any_rests() {
-            let rests = |object| self.settled.rests(object);
-            self.gather.find_off_centre(&self.store, self.carried, threads, rests);
-        }
-        if self.samples_wanted(refresh) > 0 {
-            self.settled.show(&mut self.store, &self.relight, refresh, picture);
+        let rests = |object| self.settled.rests(object);
+        let look = gather::Look {
+            store: &self.store,
+            now: refresh.now,
+            threads: refresh.threads,
+            rates,
+            contrast: &self.contrast,
+            carried: self.carried,
+            rests: (recentres && self.settled.any_rests()).then_some(&rests),
+        };
+        let shown = gather::Shown { rgb: &mut self.shown, marks: &mut marks };
+        self.gather.run(look, shown);
+        self.store.touched.clear();
+        self.doubt(size, refresh.now);
+        if wanted > 0 {
+            let (store, shown) = (&mut self.store, &mut self.shown);
+            self.settled.show(store, &self.relight, refresh, self.gather.central(), shown);
         }
         if refresh.is_noisy && self.options.without != Some(ReprojectStage::Borrow) {
-            self.settled.borrow(&self.store, refresh, picture);
+            self.settled.borrow(&self.store, refresh, &mut self.shown);
         }
-        self.shown.clone_from(picture);
+        self.gather.waiting.order(size.width, &mut self.holes);
+        canvas.update(refresh.now, &mut self.holes, &mut marks);
+        picture.clone_from(&self.shown);
     }
 
     /// Where what was known has gone at once (a cut, a jump), what is left is looked at again, too; so are places before which something
@@ -324,7 +342,7 @@ impl Reproject {
         if self.options.without == Some(ReprojectStage::Covers) {
             return;
         }
-        let before = std::mem::replace(&mut self.unknown, self.gather.waiting.len());
+        let before = std::mem::replace(&mut self.unknown, self.gather.waiting.unknown());
         if self.refreshes >= 2 && self.unknown.saturating_sub(before) > size.pixels() / MUCH_GONE {
             self.covers.doubt_all(Tick::of(now));
         }
@@ -344,12 +362,112 @@ impl Reproject {
     fn tell(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas) {
         self.shadows.find_edges(&self.store, self.relight.moved(), &mut self.edges);
         canvas.set_last_minute(&mut self.edges);
-        let gather::Gather { waiting, marks, .. } = &mut self.gather;
-        waiting.order(&mut self.holes);
-        canvas.update(refresh.now, &mut self.holes, marks);
         canvas.set_samples(self.samples_wanted(refresh), self.settled.counts());
         let grid = refresh.rates.filter(|_| refresh.wants_motion).map(|rates| &rates.grid);
         let motion = grid.into_iter().flat_map(|grid| self.tile_motion(grid));
         canvas.set_tiles(&self.contrast, motion);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Answer, Batch, Clock, Engine, Projection, SamplerKind, Surface, Tracer};
+    use std::collections::VecDeque;
+
+    /// Gathers every picture anew.
+    struct Anew(Reproject);
+
+    impl Reconstruction for Anew {
+        fn keep(&mut self, kept: &Kept<'_>, display: &Display, findings: &mut Findings) {
+            self.0.keep(kept, display, findings);
+        }
+
+        fn aim(&self, now: Time, canvas: &Canvas, requests: &mut [Request]) {
+            self.0.aim(now, canvas, requests);
+        }
+
+        fn refresh(
+            &mut self,
+            refresh: &Refresh<'_>,
+            canvas: &mut Canvas,
+            picture: &mut Vec<[f32; 3]>,
+        ) {
+            self.0.store.touched.mark_all();
+            self.0.refresh(refresh, canvas, picture);
+        }
+    }
+
+    /// A wall at rest with a lamp that flickers on a part of it, and before it a bar that moves until 0.4 s; in every fifth batch without
+    /// surfaces.
+    #[derive(Default)]
+    struct Wall(VecDeque<Batch>);
+
+    /// Column of the bar's left edge.
+    fn bar(secs: f64) -> f32 {
+        10.0 + 40.0 * secs.min(0.4) as f32
+    }
+
+    impl Tracer for Wall {
+        fn submit(&mut self, batch: Batch) {
+            self.0.push_back(batch);
+        }
+
+        fn collect(&mut self, _wait: bool) -> Option<Answer> {
+            let batch = self.0.pop_front()?;
+            let hit = |request: &Request| {
+                let ([x, y], left) = (request.position_px(batch.size), bar(batch.scene_secs));
+                let is_bar = x >= left && x < left + 9.0;
+                let position = [if is_bar { x - left } else { x }, y, 0.0];
+                let flickers = x > 70.0 && y > 30.0 && (20.0 * batch.scene_secs) as u32 % 2 == 1;
+                let grey = 0.3 + 0.2 * (0.7 * position[0]).sin() * (0.5 * y).cos();
+                let light = if flickers { 0.5 } else { 1.0 };
+                let rgb = [light * grey, if is_bar { 0.0 } else { light * grey }, 0.1];
+                (rgb, Surface { object: u32::from(is_bar), position, ..Surface::default() })
+            };
+            let (rgb, surfaces) = batch.requests.iter().map(hit).unzip();
+            let surfaces: Vec<Surface> = if batch.id % 5 == 0 { Vec::new() } else { surfaces };
+            Some(Answer::to(batch, rgb, surfaces))
+        }
+
+        fn pose(&mut self, secs: f64, _size: Size, pose: &mut Pose) -> bool {
+            let at = |left: f32, depth: f32| {
+                let rest = [0.0, 0.0, 0.0, 1.0];
+                Projection([
+                    [1.0, 0.0, 0.0, left],
+                    [0.0, 1.0, 0.0, 0.0],
+                    [0.0, 0.0, 0.0, depth],
+                    rest,
+                ])
+            };
+            pose.picture_from_object = vec![at(0.0, 2.0), at(bar(secs), 1.0)];
+            true
+        }
+    }
+
+    #[test]
+    fn what_stays_as_it_is_is_what_would_be_gathered_again() {
+        for antialias in [false, true] {
+            let options = ReprojectOptions { antialias, ..ReprojectOptions::default() };
+            let engine = |reconstruction: Box<dyn Reconstruction>| {
+                let size = Size::new(101, 45);
+                let (clock, sampler) =
+                    (Clock::simulated(120_000.0), SamplerKind::ADAPTIVE.build(3));
+                let mut engine = Engine::new(size, clock, sampler, Wall::default());
+                engine.set_reconstruction(reconstruction);
+                engine
+            };
+            let mut lazy = engine(Box::new(Reproject::new(options)));
+            let mut anew = engine(Box::new(Anew(Reproject::new(options))));
+            for refresh in 1..=70 {
+                let time = Time(refresh * 1_000_000_000 / 60);
+                let look = |engine: &mut Engine<Wall>| {
+                    engine.run_until(time).expect("finite colours");
+                    let picture = engine.refresh(time).to_vec();
+                    (picture, engine.canvas().clone())
+                };
+                assert!(look(&mut lazy) == look(&mut anew), "{antialias} {refresh}");
+            }
+        }
     }
 }

@@ -3,14 +3,14 @@
 /// Octahedral map of a unit vector, 16 bits per coordinate; at most 7e-5 off in each component (Cigolle et al. 2014, "A survey of
 /// efficient representations for independent unit vectors").
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct PackedNormal(u32);
+pub(super) struct PackedNormal(pub(super) u32);
 
 /// Square roots in 10 bits per channel; values outside [0, 1] are clamped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct PackedAlbedo(u32);
+pub(super) struct PackedAlbedo(pub(super) u32);
 
-const NORMAL_STEPS: f32 = 32_767.0;
-const ALBEDO_STEPS: f32 = 1023.0;
+pub(super) const NORMAL_STEPS: f32 = 32_767.0;
+pub(super) const ALBEDO_STEPS: f32 = 1023.0;
 
 /// To the nearest whole number, half away from zero, for small numbers: `f32::round` is a call to a library.
 #[inline(always)]

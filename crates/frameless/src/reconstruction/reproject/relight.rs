@@ -6,7 +6,9 @@
 //!
 //! What the object emits and reflects, and ambient light, stay as they were until the pixel is traced again; so do shadows.
 
-use super::store::{EMPTY, Sample, Shade, Store};
+use super::shade;
+use super::store::{EMPTY, Layout, Lit, Record, Sample, Store, Surfel};
+use crate::wide::{self, M8, Unit};
 use crate::{Display, Light, Lighting, Surface, bands};
 
 /// The lights under which the stored samples are shown.
@@ -20,18 +22,25 @@ pub(super) struct Relight {
     any_changed: bool,
 }
 
-impl Shade {
-    /// Linear colour of a surface under `lighting`; `None` if its object cannot be shaded again.
-    fn relit(&self, surface: &Surface, lighting: &Lighting) -> Option<[f32; 3]> {
-        let surface = Surface {
-            normal: self.normal.unpack(),
-            albedo: self.albedo.unpack(),
-            lit: self.lit,
-            ..*surface
-        };
-        let direct = lighting.direct(&surface)?;
-        Some(std::array::from_fn(|k| (self.rgb[k] - self.direct[k] + direct[k]).max(0.0)))
-    }
+/// Linear colour of a sample under `lighting`; `None` if its object cannot be shaded again.
+pub(super) fn relit(
+    object: u32,
+    surfel: &Surfel,
+    lit: &Lit,
+    lighting: &Lighting,
+) -> Option<[f32; 3]> {
+    let surface = Surface {
+        object,
+        position: surfel.position(),
+        normal: surfel.normal().unpack(),
+        albedo: surfel.albedo().unpack(),
+        lit: lit.lit,
+        ..Surface::default()
+    };
+    let (then, direct) = (surfel.linear(), lighting.direct(&surface)?);
+    let now = |k| then[k] - lit.direct[k] + direct[k];
+    // Not `max`, which may say −0.
+    Some(std::array::from_fn(|k| if now(k) > 0.0 { now(k) } else { 0.0 }))
 }
 
 impl Relight {
@@ -39,16 +48,16 @@ impl Relight {
     /// alike at the last two refreshes is thought to look so still.
     pub(super) fn as_shown(&self, sample: &Sample, display: &Display) -> [f32; 3] {
         if !self.has_changed(sample.object) {
-            return sample.rgb;
+            return sample.record.rgb();
         }
-        let relit = sample.shade.relit(&sample.surface(), &self.shown);
-        relit.map_or(sample.rgb, |rgb| display.encode(rgb))
+        let Sample { object, record, surfel, lit } = sample;
+        relit(*object, surfel, lit, &self.shown).map_or(record.rgb(), |rgb| display.encode(rgb))
     }
 
     /// Linear colour of the sample in a cell as it is shown.
     pub(super) fn linear(&self, store: &Store, cell: usize) -> [f32; 3] {
-        let shade = store.shade(cell);
-        shade.relit(&store.surface(cell), &self.shown).unwrap_or(shade.rgb)
+        let surfel = &store.surfel[cell];
+        relit(store.object[cell], surfel, &store.lit[cell], &self.shown).unwrap_or(surfel.linear())
     }
 
     /// Whether any object's samples were shaded again at the last refresh.
@@ -90,35 +99,84 @@ impl Relight {
     }
 
     fn shade(&self, store: &mut Store, display: &Display, threads: usize) {
-        let band = store.layout.len().div_ceil(bands::PER_THREAD * threads);
-        let mut colours = std::mem::take(&mut store.rgb);
-        let [red, green, blue] = colours.each_mut().map(|plane| plane.chunks_mut(band));
-        let chunks = red.zip(green).zip(blue).map(|((red, green), blue)| [red, green, blue]);
+        let stride = store.layout.stride;
+        let band = (store.layout.len() / stride).div_ceil(bands::PER_THREAD * threads) * stride;
+        let mut records = std::mem::take(&mut store.record);
         let shaded = &*store;
-        bands::run(threads, chunks.enumerate().collect(), |(nth, rgb)| {
-            self.shade_cells(shaded, nth * band, rgb, display);
+        let bands = records.chunks_mut(band).enumerate();
+        let bands = bands.map(|(nth, records)| Shading {
+            relight: self,
+            store: shaded,
+            display,
+            first: nth * band,
+            records,
         });
-        store.rgb = colours;
+        bands::run(threads, bands.collect(), wide::run);
+        store.record = records;
     }
+}
 
-    /// The cells from `first` on, whose display-referred colours are `rgb`.
-    fn shade_cells(&self, store: &Store, first: usize, rgb: [&mut [f32]; 3], display: &Display) {
-        let mut before = (EMPTY, false);
-        for at in 0..rgb[0].len() {
-            let cell = first + at;
-            let object = store.object[cell];
-            // Neighbours are mostly of the same object.
-            if object != before.0 {
-                before = (object, self.has_changed(object));
-            }
-            if !before.1 {
-                continue;
-            }
-            if let Some(linear) = store.shade(cell).relit(&store.surface(cell), &self.shown) {
-                let encoded = display.encode(linear);
-                (0..3).for_each(|k| rgb[k][at] = encoded[k]);
+/// Shades the samples of some rows of cells, whose records are apart.
+struct Shading<'a> {
+    relight: &'a Relight,
+    store: &'a Store,
+    display: &'a Display,
+    /// The first of the cells.
+    first: usize,
+    records: &'a mut [Record],
+}
+
+impl wide::Task for Shading<'_> {
+    #[inline(always)]
+    fn run<U: Unit>(mut self) {
+        let stride = self.store.layout.stride;
+        for row in 0..self.records.len() / stride {
+            for column in (0..stride).step_by(8) {
+                let start = row * stride + column;
+                if self.eight::<U>(start) {
+                    self.touch(self.first + start);
+                }
             }
         }
+    }
+}
+
+impl Shading<'_> {
+    /// Eight cells from the one with the record `start` on. Returns whether any has been shaded.
+    #[inline(always)]
+    fn eight<U: Unit>(&mut self, start: usize) -> bool {
+        let Shading { relight, store, display, first, .. } = *self;
+        let cells = first + start..first + start + 8;
+        let objects = M8::<U>::load(&store.object, first + start);
+        let mut waiting = objects.equals(M8::splat(EMPTY)).not();
+        let mut any = false;
+        while let Some(lane) = waiting.first() {
+            let object = store.object[first + start + lane];
+            let same = objects.equals(M8::splat(object));
+            waiting = waiting.and(same.not());
+            let place = relight.shown.world_from_object.get(object as usize).copied().flatten();
+            let Some(place) = place.filter(|_| relight.has_changed(object)) else { continue };
+            let (surfels, _) = store.surfel[cells.clone()].as_chunks::<8>();
+            let (lits, _) = store.lit[cells.clone()].as_chunks::<8>();
+            let linear =
+                shade::Eight::<U>::new(&surfels[0], &lits[0]).relit(&place, &relight.shown.lights);
+            let [r, g, b] = display.encode_eight(linear);
+            let [r, g, b] = [r.lanes(), g.lanes(), b.lanes()];
+            let records = &mut self.records[start..start + 8];
+            same.for_each(|lane| records[lane].set_rgb([r[lane], g[lane], b[lane]]));
+            any = true;
+        }
+        any
+    }
+
+    /// The eight cells from `cell` on have been shaded. Their pixels begin one to the left of a tile.
+    fn touch(&self, cell: usize) {
+        let Layout { size, stride, .. } = self.store.layout;
+        let in_plane = self.store.layout.in_plane(cell);
+        // Samples are inside the picture; one row and one column of the border lie before it.
+        let (x, y) = ((in_plane % stride) as u32, (in_plane / stride) as u32 - 1);
+        self.store.touched.mark(x.saturating_sub(1), y);
+        self.store.touched.mark(x.min(size.width - 1), y);
     }
 }
 

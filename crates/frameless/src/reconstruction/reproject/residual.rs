@@ -4,7 +4,7 @@
 //! nearest pixel and against the bilinear interpolation. For a moving one it is the distance to the range of the 3×3 colours
 //! there, plus a tenth of that: resampling a texture at other places is not change.
 
-use super::store::{SCREEN, Sample, Tick};
+use super::store::{SCREEN, Sample};
 use super::{Reproject, ReprojectStage};
 use crate::{Display, Kept, Request, Size};
 
@@ -42,8 +42,11 @@ impl Reproject {
         i: usize,
         display: &Display,
     ) -> Found {
-        let rgb =
-            if self.options.relight { self.relight.as_shown(sample, display) } else { sample.rgb };
+        let rgb = if self.options.relight {
+            self.relight.as_shown(sample, display)
+        } else {
+            sample.record.rgb()
+        };
         let found = self.against_shown(sample, rgb, || display.encode(kept.old[i]));
         let request = kept.requests[i];
         let (x, y) = kept.size.xy(request.pixel);
@@ -53,14 +56,17 @@ impl Reproject {
         {
             // The same ray as before: all that differs is change. (Against the picture, a mean of old samples would differ from
             // every new one, be thought to change, and so remain a mean.)
-            let before = std::array::from_fn(|k| self.store.rgb[k][cell]);
+            let before = self.store.record[cell].rgb();
             let change = squared(rgb, before);
             if !self.knows_lights && !kept.is_noisy {
-                let age_secs = kept.now.secs_since(Tick(self.store.tick[cell]).time(kept.now));
+                let age_secs = kept.now.secs_since(self.store.tick(cell).time(kept.now));
                 self.drift.note([x, y], before, rgb, age_secs as f32);
             }
             if self.settled.count(request.pixel) > 0 {
                 let (rgb, is_noisy) = (kept.new[i], kept.is_noisy);
+                if change > 0.0 {
+                    self.store.touched.mark(x, y);
+                }
                 let reaches_on = self.settled.verify(request.pixel, rgb, change, display, is_noisy);
                 if reaches_on && change > VISIBLE {
                     self.settled.begin_around(&self.store, &self.relight, [x, y], display);
@@ -77,7 +83,7 @@ impl Reproject {
 
     fn against_shown(&self, sample: &Sample, rgb: [f32; 3], old: impl Fn() -> [f32; 3]) -> Found {
         if self.refreshes == 0 || sample.object == SCREEN {
-            let change = squared(sample.rgb, old());
+            let change = squared(sample.record.rgb(), old());
             return Found { change, outdated: change > 3.0 * OUTDATED, depth: f32::INFINITY };
         }
         let size = self.store.layout.size;

@@ -2,7 +2,7 @@
 
 use super::relight::Relight;
 use super::settle::{self, Means};
-use super::store::{Layout, Store};
+use super::store::Store;
 use crate::Refresh;
 use crate::wide::{self, M8, Unit};
 
@@ -41,6 +41,8 @@ pub(super) struct Rest<'a> {
     pub(super) store: &'a Store,
     pub(super) relight: &'a Relight,
     pub(super) refresh: &'a Refresh<'a>,
+    /// Row by row, bit by bit for eight pixels at a time: which have a sample at their centre.
+    pub(super) central: &'a [u8],
     /// See [`mark_moving`].
     pub(super) moving: &'a [u8],
     /// The band's first pixel.
@@ -77,7 +79,7 @@ impl Rest<'_> {
     fn eight<U: Unit>(&mut self, x: u32, y: u32, lanes: usize) {
         let start = self.in_band(x, y);
         let all = (1 << lanes) - 1;
-        let rest = self.at_rest::<U>(x, y) & all;
+        let rest = self.at_rest(x, y) & all;
         let (some, many) = self.counted::<U>(start, lanes);
         let mut begin = rest & !some;
         if self.relight.has_changed_any() {
@@ -107,8 +109,8 @@ impl Rest<'_> {
 
     /// A bit for each of eight pixels: whether it has a sample at its centre, and nothing moves in it and the eight around it.
     #[inline(always)]
-    fn at_rest<U: Unit>(&self, x: u32, y: u32) -> u32 {
-        let Layout { plane, stride, .. } = self.store.layout;
+    fn at_rest(&self, x: u32, y: u32) -> u32 {
+        let stride = self.store.layout.stride;
         let first = self.store.layout.of_pixel(x as i32, y as i32);
         let around = [first - stride, first, first + stride].map(|i| {
             let eight =
@@ -118,13 +120,8 @@ impl Rest<'_> {
         let moving = (around[0] | around[1] | around[2]).to_le_bytes();
         let still =
             moving.iter().enumerate().fold(0, |bits, (lane, &m)| bits | u32::from(m == 0) << lane);
-        if still == 0 {
-            return 0;
-        }
-        let subs = (0..self.store.layout.subs()).map(|sub| first + sub * plane);
-        let central = subs
-            .fold(M8::<U>::splat(0), |any, cell| any.either(self.store.are_central(cell, x, y)));
-        still & central.bits()
+        let columns = self.store.layout.size.width.div_ceil(8);
+        still & u32::from(self.central[(y * columns + x / 8) as usize])
     }
 
     /// A bit for each of eight pixels: whether its sample at the centre has been shaded again.

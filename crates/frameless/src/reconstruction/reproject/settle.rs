@@ -260,6 +260,7 @@ impl Settled {
         store: &mut Store,
         relight: &Relight,
         refresh: &Refresh<'_>,
+        central: &[u8],
         picture: &mut [[f32; 3]],
     ) {
         if !self.any_rests() && !refresh.is_noisy {
@@ -286,7 +287,18 @@ impl Settled {
             let means = Means { count, sum, spread, encoded };
             let first = nth * band;
             let store = shown;
-            Rest { store, relight, refresh, moving, first, means, picture, handed_back, left }
+            Rest {
+                store,
+                relight,
+                refresh,
+                central,
+                moving,
+                first,
+                means,
+                picture,
+                handed_back,
+                left,
+            }
         });
         bands::run(refresh.threads, bands.collect(), wide::run);
         for (cell, rgb) in self.handed_back.iter_mut().flat_map(|cells| cells.drain(..)) {
@@ -345,6 +357,7 @@ impl Settled {
                 if self.count(pixel) > 1
                     && let Some(cell) = store.central(x, y)
                 {
+                    store.touched.mark(x, y);
                     self.begin(pixel as usize, relight.linear(store, cell), display);
                 }
             }

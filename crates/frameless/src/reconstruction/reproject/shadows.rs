@@ -33,10 +33,11 @@ impl Shadows {
     /// A new sample is about to take the cell of one of the same object, which rests.
     #[inline(always)]
     pub(super) fn note(&mut self, store: &Store, cell: usize, sample: &Sample) {
-        let changed = store.shade(cell).lit ^ sample.shade.lit;
-        let [dx, dy] = [0, 1].map(|k| store.px[k][cell] - sample.px[k]);
+        let changed = store.lit[cell].lit ^ sample.lit.lit;
+        let [[x0, y0], [x1, y1]] = [store.record[cell].px(), sample.record.px()];
+        let [dx, dy] = [x0 - x1, y0 - y1];
         if changed != 0 && dx * dx + dy * dy < CENTRAL_PX * CENTRAL_PX {
-            let [x, y] = sample.px.map(|p| p as u32 / TILE);
+            let [x, y] = sample.record.px().map(|p| p as u32 / TILE);
             self.seen[0][(y * self.columns + x) as usize] |= changed;
             self.any[0] = true;
         }
@@ -74,8 +75,7 @@ impl Shadows {
 fn find_in_tile(store: &Store, [x0, y0]: [u32; 2], lights: u32, edges: &mut Vec<u32>) {
     let (layout, Size { width, height }) = (store.layout, store.layout.size);
     let differ = |a: usize, b: usize| {
-        store.object[a] == store.object[b]
-            && (store.shade(a).lit ^ store.shade(b).lit) & lights != 0
+        store.object[a] == store.object[b] && (store.lit[a].lit ^ store.lit[b].lit) & lights != 0
     };
     for y in y0..(y0 + TILE).min(height) {
         for x in x0..(x0 + TILE).min(width) {
@@ -92,21 +92,19 @@ fn find_in_tile(store: &Store, [x0, y0]: [u32; 2], lights: u32, edges: &mut Vec<
 
 #[cfg(test)]
 mod tests {
-    use super::super::store::{Anchor, Shade, Tick};
+    use super::super::store::{Lit, Record, Surfel};
     use super::*;
 
     const SIZE: Size = Size { width: 96, height: 32 };
 
+    fn sample_at([x, y]: [f32; 2], lit: u32) -> Sample {
+        let record = Record([x, y, 1.0, f32::from_bits(1), 0.5, 0.5, 0.5, 0.0]);
+        let lit = Lit { lit, ..Lit::default() };
+        Sample { object: 0, record, surfel: Surfel::default(), lit }
+    }
+
     fn sample(x: u32, y: u32, lit: u32) -> Sample {
-        Sample {
-            rgb: [0.5; 3],
-            px: [x as f32 + 0.5, y as f32 + 0.5],
-            depth: 1.0,
-            tick: Tick(1),
-            object: 0,
-            anchor: Anchor::default(),
-            shade: Shade { lit, ..Shade::default() },
-        }
+        sample_at([x as f32 + 0.5, y as f32 + 0.5], lit)
     }
 
     /// A floor under two lights: what the first reaches ends between columns 3 and 4, and the second's between 87 and 88.
@@ -142,7 +140,7 @@ mod tests {
         shadows.fit(SIZE);
         let cell = store.layout.of_pixel(5, 5);
         let note = |shadows: &mut Shadows, x: f32, lit| {
-            shadows.note(&store, cell, &Sample { px: [x, 5.5], ..sample(5, 5, lit) });
+            shadows.note(&store, cell, &sample_at([x, 5.5], lit));
         };
         note(&mut shadows, 5.5, 0b10);
         note(&mut shadows, 5.25, 0b11);

@@ -1,13 +1,14 @@
 //! The samples kept: at most one in every cell of the picture.
 //!
-//! Stored plane by plane, so that eight pixels at a time can be worked on. With n×n cells per pixel there are n² sub-grids, each with
-//! one cell of every pixel, one after the other; every sub-grid has a border of one empty cell, so that loops over neighbours
-//! need no bounds.
+//! What the picture needs of a sample is one record of half a line of the cache, and what its surface is another: samples are kept, and
+//! put down where their surfaces have moved, one by one and all over the picture, and every place in memory that has to be looked at
+//! is one to wait for. Loops over eight pixels at a time turn records into columns. Only objects' numbers lie by themselves.
 //!
-//! What shading a sample again takes is needed only now and then, and lies in a slot. When the sample moves to another cell its slot
-//! stays where it is. Every cell has one, also while it is empty.
+//! With n×n cells per pixel there are n² sub-grids, each with one cell of every pixel, one after the other; every sub-grid has a border
+//! of one empty cell, so that loops over neighbours need no bounds.
 
 use super::packed::{PackedAlbedo, PackedNormal};
+use super::touched::Touched;
 use crate::time::TICK_BITS;
 pub(super) use crate::time::{TICK_SECS, Tick};
 use crate::wide::{self, F8, M8, Unit};
@@ -21,88 +22,157 @@ pub(super) const EMPTY: u32 = Surface::SKY - 2;
 /// A sample so near to the centre is as good as one at the centre: rounding of its projected position.
 pub(super) const CENTRAL_PX: f32 = 0.002;
 
-/// A point on an object, as in [`Surface`]: its position, and the bits of the primitive's number.
+/// What the picture needs of a sample: column and row, depth, the bits of its tick, red, green, blue, the bits of the primitive's number.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Anchor(pub(super) [f32; 4]);
+#[repr(align(32))]
+pub(super) struct Record(pub(super) [f32; 8]);
 
-impl Anchor {
-    fn new(surface: &Surface) -> Anchor {
-        let [x, y, z] = surface.position;
-        Anchor([x, y, z, f32::from_bits(surface.primitive)])
+/// What was hit, as in [`Surface`], and the linear colour that was traced: position, red, green, blue, the bits of the packed normal and
+/// albedo.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(32))]
+pub(super) struct Surfel(pub(super) [f32; 8]);
+
+/// The lights that the traced colour shows, as in [`Surface`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(align(16))]
+pub(super) struct Lit {
+    pub(super) direct: [f32; 3],
+    pub(super) lit: u32,
+}
+
+impl Record {
+    /// Where in the picture, in pixels.
+    #[inline(always)]
+    pub(super) fn px(&self) -> [f32; 2] {
+        [self.0[0], self.0[1]]
     }
 
-    /// The point on `object`, and no more.
-    pub(super) fn on(&self, object: u32) -> Surface {
-        let [x, y, z, primitive] = self.0;
-        let (position, primitive) = ([x, y, z], primitive.to_bits());
-        Surface { object, primitive, position, ..Surface::default() }
+    #[inline(always)]
+    pub(super) fn depth(&self) -> f32 {
+        self.0[2]
+    }
+
+    #[inline(always)]
+    pub(super) fn tick(&self) -> Tick {
+        Tick(self.0[3].to_bits())
+    }
+
+    /// Display-referred sRGB.
+    #[inline(always)]
+    pub(super) fn rgb(&self) -> [f32; 3] {
+        [self.0[4], self.0[5], self.0[6]]
+    }
+
+    #[inline(always)]
+    pub(super) fn set_rgb(&mut self, [r, g, b]: [f32; 3]) {
+        (self.0[4], self.0[5], self.0[6]) = (r, g, b);
+    }
+
+    #[inline(always)]
+    pub(super) fn set_px(&mut self, [x, y]: [f32; 2]) {
+        (self.0[0], self.0[1]) = (x, y);
+    }
+
+    #[inline(always)]
+    pub(super) fn set_depth(&mut self, depth: f32) {
+        self.0[2] = depth;
+    }
+
+    /// Whether both are at the same place in the picture and of the same colour.
+    #[inline(always)]
+    fn looks_like(&self, other: &Record) -> bool {
+        self.px() == other.px() && self.rgb() == other.rgb()
+    }
+
+    #[inline(always)]
+    pub(super) fn primitive(&self) -> u32 {
+        self.0[7].to_bits()
     }
 }
 
-/// What shading a sample again takes.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Shade {
+impl Surfel {
+    // Inlined: what is written to memory in small parts and read in large ones at once has to wait for all that was written before.
+    #[inline(always)]
+    fn new(surface: Option<&Surface>, [r, g, b]: [f32; 3]) -> Surfel {
+        let Some(surface) = surface else {
+            return Surfel([0.0, 0.0, 0.0, r, g, b, 0.0, 0.0]);
+        };
+        let [x, y, z] = surface.position;
+        let normal = f32::from_bits(PackedNormal::new(surface.normal).0);
+        let albedo = f32::from_bits(PackedAlbedo::new(surface.albedo).0);
+        Surfel([x, y, z, r, g, b, normal, albedo])
+    }
+
+    #[inline(always)]
+    pub(super) fn position(&self) -> [f32; 3] {
+        [self.0[0], self.0[1], self.0[2]]
+    }
+
     /// Linear RGB as traced.
-    pub(super) rgb: [f32; 3],
-    /// As in [`Surface`].
-    pub(super) direct: [f32; 3],
-    pub(super) normal: PackedNormal,
-    pub(super) albedo: PackedAlbedo,
-    pub(super) lit: u32,
+    #[inline(always)]
+    pub(super) fn linear(&self) -> [f32; 3] {
+        [self.0[3], self.0[4], self.0[5]]
+    }
+
+    pub(super) fn normal(&self) -> PackedNormal {
+        PackedNormal(self.0[6].to_bits())
+    }
+
+    pub(super) fn albedo(&self) -> PackedAlbedo {
+        PackedAlbedo(self.0[7].to_bits())
+    }
+}
+
+impl Lit {
+    #[inline(always)]
+    fn new(surface: Option<&Surface>) -> Lit {
+        surface.map_or(Lit::default(), |surface| Lit { direct: surface.direct, lit: surface.lit })
+    }
+}
+
+/// The numbers of eight records.
+#[inline(always)]
+pub(super) fn rows_of([a, b, c, d, e, f, g, h]: &[Record; 8]) -> [&[f32; 8]; 8] {
+    [&a.0, &b.0, &c.0, &d.0, &e.0, &f.0, &g.0, &h.0]
+}
+
+/// Where a sample is on its object, and no more.
+#[inline(always)]
+pub(super) fn surface(object: u32, record: &Record, surfel: &Surfel) -> Surface {
+    let (primitive, position) = (record.primitive(), surfel.position());
+    Surface { object, primitive, position, ..Surface::default() }
 }
 
 /// One sample.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sample {
-    /// Display-referred sRGB.
-    pub(super) rgb: [f32; 3],
-    /// Where in the picture, in pixels.
-    pub(super) px: [f32; 2],
-    pub(super) depth: f32,
-    pub(super) tick: Tick,
     pub(super) object: u32,
-    pub(super) anchor: Anchor,
-    pub(super) shade: Shade,
+    pub(super) record: Record,
+    pub(super) surfel: Surfel,
+    pub(super) lit: Lit,
 }
 
 /// Half a second.
 const VERY_OLD_TICKS: u32 = 500_000_000 >> TICK_BITS;
 
-impl Shade {
-    // Inlined: what is written to memory in small parts and read in large ones at once has to wait for all that was written before.
-    #[inline(always)]
-    fn new(surface: Option<&Surface>, rgb: [f32; 3]) -> Shade {
-        let Some(surface) = surface else { return Shade { rgb, ..Shade::default() } };
-        Shade {
-            rgb,
-            direct: surface.direct,
-            normal: PackedNormal::new(surface.normal),
-            albedo: PackedAlbedo::new(surface.albedo),
-            lit: surface.lit,
-        }
-    }
-}
-
 impl Sample {
+    /// At an unknown depth.
     #[inline(always)]
     pub(super) fn new(kept: &Kept<'_>, i: usize, display: &Display) -> Sample {
-        let (object, anchor) = match kept.surfaces.get(i) {
-            Some(surface) => (surface.object, Anchor::new(surface)),
-            None => (SCREEN, Anchor::default()),
-        };
-        Sample {
-            rgb: display.encode(kept.new[i]),
-            px: kept.requests[i].position_px(kept.size),
-            depth: f32::INFINITY,
-            tick: Tick::of(kept.now),
-            object,
-            anchor,
-            shade: Shade::new(kept.surfaces.get(i), kept.new[i]),
-        }
+        let (surface, linear) = (kept.surfaces.get(i), kept.new[i]);
+        let (object, primitive) = surface.map_or((SCREEN, 0), |s| (s.object, s.primitive));
+        let [x, y] = kept.requests[i].position_px(kept.size);
+        let [r, g, b] = display.encode(linear);
+        let [tick, primitive] = [Tick::of(kept.now).0, primitive].map(f32::from_bits);
+        let record = Record([x, y, f32::INFINITY, tick, r, g, b, primitive]);
+        Sample { object, record, surfel: Surfel::new(surface, linear), lit: Lit::new(surface) }
     }
 
+    /// Where it is on its object, and no more.
+    #[inline(always)]
     pub(super) fn surface(&self) -> Surface {
-        self.anchor.on(self.object)
+        surface(self.object, &self.record, &self.surfel)
     }
 }
 
@@ -167,6 +237,12 @@ impl Layout {
         Some(first + self.plane * (sub(y, row) * self.per_side as usize + sub(x, column)))
     }
 
+    /// Where a cell is in its sub-grid.
+    #[inline(always)]
+    pub(super) fn in_plane(&self, cell: usize) -> usize {
+        if cell < self.plane { cell } else { cell % self.plane }
+    }
+
     /// The cell `dx`, `dy` cells from the first cell of pixel (x, y).
     #[inline(always)]
     pub(super) fn neighbour(&self, x: i32, y: i32, dx: i32, dy: i32) -> usize {
@@ -181,59 +257,61 @@ impl Layout {
     }
 }
 
-/// A grid of cells, plane by plane.
+/// A grid of cells.
 pub(super) struct Store {
     pub(super) layout: Layout,
-    pub(super) rgb: [Vec<f32>; 3],
-    pub(super) px: [Vec<f32>; 2],
-    pub(super) depth: Vec<f32>,
-    pub(super) tick: Vec<u32>,
     pub(super) object: Vec<u32>,
-    pub(super) anchor: Vec<Anchor>,
-    pub(super) slot: Vec<u32>,
-    /// Per slot.
-    pub(super) shade: Vec<Shade>,
-    /// Slots that no cell has.
-    pub(super) spare: Vec<u32>,
+    pub(super) record: Vec<Record>,
+    pub(super) surfel: Vec<Surfel>,
+    pub(super) lit: Vec<Lit>,
+    pub(super) touched: Touched,
 }
 
 impl Store {
     pub(super) fn new(size: Size, per_side: u32) -> Store {
         let layout = Layout::new(size, per_side);
-        let plane = || vec![0.0; layout.len()];
         Store {
-            rgb: std::array::from_fn(|_| plane()),
-            px: std::array::from_fn(|_| plane()),
-            depth: plane(),
-            tick: vec![0; layout.len()],
             object: vec![EMPTY; layout.len()],
-            anchor: vec![Anchor::default(); layout.len()],
-            slot: (0..layout.len() as u32).collect(),
-            shade: vec![Shade::default(); layout.len()],
-            spare: Vec::new(),
+            record: vec![Record::default(); layout.len()],
+            surfel: vec![Surfel::default(); layout.len()],
+            lit: vec![Lit::default(); layout.len()],
+            touched: Touched::new(size),
             layout,
         }
     }
 
+    /// `i`: the cell of the sample's position.
+    #[inline(always)]
     pub(super) fn set(&mut self, i: usize, sample: &Sample) {
-        (0..3).for_each(|k| self.rgb[k][i] = sample.rgb[k]);
-        [self.px[0][i], self.px[1][i]] = sample.px;
-        self.depth[i] = sample.depth;
-        self.tick[i] = sample.tick.0;
+        if self.object[i] != sample.object || !self.record[i].looks_like(&sample.record) {
+            self.touched.mark_px(sample.record.px());
+        }
         self.object[i] = sample.object;
-        self.anchor[i] = sample.anchor;
-        self.shade[self.slot[i] as usize] = sample.shade;
+        self.record[i] = sample.record;
+        self.surfel[i] = sample.surfel;
+        self.lit[i] = sample.lit;
+    }
+
+    /// Takes the sample in a cell away.
+    pub(super) fn remove(&mut self, i: usize) {
+        self.touched.mark_px(self.record[i].px());
+        self.object[i] = EMPTY;
     }
 
     /// Where the sample in a cell is on its object.
     #[inline(always)]
     pub(super) fn surface(&self, i: usize) -> Surface {
-        self.anchor[i].on(self.object[i])
+        surface(self.object[i], &self.record[i], &self.surfel[i])
     }
 
     #[inline(always)]
-    pub(super) fn shade(&self, i: usize) -> &Shade {
-        &self.shade[self.slot[i] as usize]
+    pub(super) fn tick(&self, i: usize) -> Tick {
+        self.record[i].tick()
+    }
+
+    #[inline(always)]
+    pub(super) fn depth(&self, i: usize) -> f32 {
+        self.record[i].depth()
     }
 
     /// All samples for another display, from their `linear` colours.
@@ -242,20 +320,20 @@ impl Store {
         display: &Display,
         linear: impl Fn(&Store, usize) -> [f32; 3],
     ) {
+        self.touched.mark_all();
         for i in 0..self.layout.len() {
-            if self.is_empty(i) {
-                continue;
+            if !self.is_empty(i) {
+                let rgb = display.encode(linear(self, i));
+                self.record[i].set_rgb(rgb);
             }
-            let rgb = display.encode(linear(self, i));
-            (0..3).for_each(|k| self.rgb[k][i] = rgb[k]);
         }
     }
 
     /// Gives the sample in a cell another linear colour.
     pub(super) fn recolour(&mut self, i: usize, rgb: [f32; 3], display: &Display) {
-        self.shade[self.slot[i] as usize].rgb = rgb;
-        let encoded = display.encode(rgb);
-        (0..3).for_each(|k| self.rgb[k][i] = encoded[k]);
+        self.touched.mark_px(self.record[i].px());
+        self.surfel[i].0[3..6].copy_from_slice(&rgb);
+        self.record[i].set_rgb(display.encode(rgb));
     }
 
     #[inline(always)]
@@ -263,24 +341,36 @@ impl Store {
         self.object[i] == EMPTY
     }
 
+    /// Column `k` of the records in the eight cells from `first` on.
+    #[inline(always)]
+    pub(super) fn column<U: Unit>(&self, k: usize, first: usize) -> F8<U> {
+        let mut lanes = [0.0; 8];
+        for (lane, record) in lanes.iter_mut().zip(&self.record[first..first + 8]) {
+            *lane = record.0[k];
+        }
+        F8::new(lanes)
+    }
+
+    /// The depths in the eight cells from `first` on.
+    #[inline(always)]
+    pub(super) fn depths<U: Unit>(&self, first: usize) -> F8<U> {
+        self.column(2, first)
+    }
+
+    /// The ticks in the eight cells from `first` on.
+    #[inline(always)]
+    pub(super) fn ticks<U: Unit>(&self, first: usize) -> M8<U> {
+        self.column::<U>(3, first).to_bits()
+    }
+
     /// Begins to fetch what is known of a pixel's samples.
     #[inline(always)]
     pub(super) fn prefetch(&self, x: u32, y: u32) {
         for i in self.of_pixel(x, y) {
-            self.rgb.iter().chain(&self.px).for_each(|plane| wide::prefetch(plane, i));
-            wide::prefetch(&self.depth, i);
-            [&self.tick, &self.object, &self.slot]
-                .into_iter()
-                .for_each(|plane| wide::prefetch(plane, i));
-            wide::prefetch(&self.anchor, i);
-        }
-    }
-
-    /// The same of what their shading takes, once the former is there.
-    #[inline(always)]
-    pub(super) fn prefetch_shade(&self, x: u32, y: u32) {
-        for i in self.of_pixel(x, y) {
-            wide::prefetch(&self.shade, self.slot[i] as usize);
+            wide::prefetch(&self.object, i);
+            wide::prefetch(&self.record, i);
+            wide::prefetch(&self.surfel, i);
+            wide::prefetch(&self.lit, i);
         }
     }
 
@@ -302,47 +392,32 @@ impl Store {
     pub(super) fn newest_of(&self, first: usize) -> Option<usize> {
         let cells = (0..self.layout.subs()).map(|sub| first + sub * self.layout.plane);
         cells.filter(|&i| !self.is_empty(i)).reduce(|newest, i| {
-            if Tick(self.tick[i]).is_later_than(Tick(self.tick[newest])) { i } else { newest }
+            if self.tick(i).is_later_than(self.tick(newest)) { i } else { newest }
         })
-    }
-
-    /// Of the cell `first` of pixel (x, y) and the seven to its right: whether there are samples at the pixels' centres.
-    #[inline(always)]
-    pub(super) fn are_central<U: Unit>(&self, first: usize, x: u32, y: u32) -> M8<U> {
-        let is_sample = M8::load(&self.object, first).equals(M8::splat(EMPTY)).not();
-        let px = [F8::load(&self.px[0], first), F8::load(&self.px[1], first)];
-        let near = F8::splat(CENTRAL_PX * CENTRAL_PX);
-        is_sample.and(distance2(px, &centres(x, y)).less_than(near))
     }
 
     /// The cell of a sample at a pixel's centre.
     #[inline(always)]
     pub(super) fn central(&self, x: u32, y: u32) -> Option<usize> {
         let is_central = |&i: &usize| {
-            let (dx, dy) = (self.px[0][i] - (x as f32 + 0.5), self.px[1][i] - (y as f32 + 0.5));
+            let [px, py] = self.record[i].px();
+            let (dx, dy) = (px - (x as f32 + 0.5), py - (y as f32 + 0.5));
             !self.is_empty(i) && dx * dx + dy * dy < CENTRAL_PX * CENTRAL_PX
         };
         self.of_pixel(x, y).find(is_central)
     }
 
-    /// A slot that no cell has.
-    pub(super) fn new_slot(&mut self) -> u32 {
-        self.spare.pop().unwrap_or_else(|| {
-            self.shade.push(Shade::default());
-            self.shade.len() as u32 - 1
-        })
-    }
-
     /// Puts a sample into its cell. `outdated`: the pixel's others show something that is no longer there. Very old ones go in any case:
     /// carried from pixel to pixel, never alone where a new one lands in its cell, they could stay for seconds.
     pub(super) fn insert(&mut self, sample: &Sample, outdated: bool) {
-        let Some(i) = self.layout.of_px(sample.px) else { return };
+        let Some(i) = self.layout.of_px(sample.record.px()) else { return };
         let subs = self.layout.subs();
         if subs > 1 {
-            let first = i % self.layout.plane;
-            for cell in (0..subs).map(|sub| first + sub * self.layout.plane) {
-                if outdated || sample.tick.0.wrapping_sub(self.tick[cell]) > VERY_OLD_TICKS {
-                    self.object[cell] = EMPTY;
+            let (first, plane) = (i % self.layout.plane, self.layout.plane);
+            for cell in (0..subs).map(|sub| first + sub * plane) {
+                let ticks = sample.record.tick().0.wrapping_sub(self.tick(cell).0);
+                if outdated || ticks > VERY_OLD_TICKS {
+                    self.remove(cell);
                 }
             }
         }

@@ -10,10 +10,11 @@
 
 mod carry;
 
+use std::ops::Range;
 use std::sync::Mutex;
 
 use super::cells::Cells;
-use super::store::{Anchor, SCREEN, Store};
+use super::store::{self, Layout, Lit, Record, SCREEN, Store, Surfel};
 use crate::{Pose, bands, wide};
 
 use carry::{Band, Carry, Lifted};
@@ -25,11 +26,11 @@ const SAME_SURFACE: f32 = 0.015;
 const NOWHERE: u32 = 0;
 /// Neither inside a picture nor NaN.
 const GONE_PX: f32 = -1.0;
-/// The slot of a cell whose sample has been lifted.
-const NO_SLOT: u32 = u32::MAX;
 
 /// Rows of a band: few samples leave it, and eight threads have something to do with a small picture.
 const BAND_ROWS: usize = 64;
+/// So many samples later the cell that is prefetched is used.
+const AHEAD: usize = 12;
 /// So many displaced samples are carried at a time.
 const CHUNK: usize = 4096;
 
@@ -42,9 +43,7 @@ pub(super) struct Warp {
     moved: Vec<Moved>,
     /// Rows of each thread.
     lifted: Mutex<Vec<Lifted>>,
-    losers: Vec<Mover>,
-    /// Slots of samples that are gone.
-    free: Vec<u32>,
+    losers: Vec<Loser>,
 }
 
 /// What is left to do when samples of a band have been carried.
@@ -52,22 +51,44 @@ pub(super) struct Warp {
 struct Moved {
     /// Samples that came to another band, or to a row that had not been lifted.
     early: Vec<(u32, Mover)>,
-    losers: Vec<Mover>,
-    /// First cells of eights of which some have been lifted.
-    starts: Vec<u32>,
-    free: Vec<u32>,
+    losers: Vec<Loser>,
 }
 
 /// One sample on its way.
 #[derive(Clone, Copy)]
 struct Mover {
-    px: [f32; 2],
-    depth: f32,
-    rgb: [f32; 3],
-    tick: u32,
+    record: Record,
+    surfel: Surfel,
+    lit: Lit,
     object: u32,
-    slot: u32,
-    anchor: Anchor,
+}
+
+/// The same, where it is kept meanwhile.
+#[derive(Clone, Copy)]
+struct Moving<'a> {
+    record: &'a Record,
+    surfel: &'a Surfel,
+    lit: &'a Lit,
+    object: u32,
+}
+
+/// Who lost its cell, and the one beside it where there may be room.
+type Loser = (u32, Mover);
+
+impl Mover {
+    #[inline(always)]
+    fn moving(&self) -> Moving<'_> {
+        let Mover { record, surfel, lit, object } = self;
+        Moving { record, surfel, lit, object: *object }
+    }
+}
+
+impl Moving<'_> {
+    #[inline(always)]
+    fn mover(&self) -> Mover {
+        let Moving { record, surfel, lit, object } = *self;
+        Mover { record: *record, surfel: *surfel, lit: *lit, object }
+    }
 }
 
 impl Warp {
@@ -83,17 +104,15 @@ impl Warp {
         self.carry_displaced(pose, threads);
         self.put_down_early(store);
         self.step_aside(store);
-        self.give_back_slots(store);
     }
 
     /// Takes the sample in a cell away until the next refresh: it moves, and somebody else is there now. Beyond as many as there are
     /// cells, while nobody asks for a picture, samples are lost.
     pub(super) fn displace(&mut self, store: &mut Store, cell: usize) {
-        if self.displaced.len() >= store.layout.len() {
-            return;
+        if self.displaced.len() < store.layout.len() {
+            self.displaced.push(at(&Cells::of(store), cell));
+            store.remove(cell);
         }
-        self.displaced.push(take(&mut Cells::of(store), cell));
-        store.slot[cell] = store.new_slot();
     }
 
     pub(super) fn has_displaced(&self) -> bool {
@@ -133,63 +152,55 @@ impl Warp {
         let chunks = self.displaced.chunks_mut(CHUNK).collect();
         bands::run(threads, chunks, |chunk: &mut [Mover]| {
             for mover in chunk {
-                match pose.project(&mover.anchor.on(mover.object)) {
-                    Some(there) => (mover.px, mover.depth) = (there.px, there.depth),
-                    None => mover.px = [GONE_PX; 2],
+                let surface = store::surface(mover.object, &mover.record, &mover.surfel);
+                match pose.project(&surface) {
+                    Some(there) => {
+                        mover.record.set_px(there.px);
+                        mover.record.set_depth(there.depth);
+                    }
+                    None => mover.record.set_px([GONE_PX; 2]),
                 }
             }
         });
     }
 
     fn put_down_early(&mut self, store: &mut Store) {
-        let Warp { displaced, moved, losers, free, .. } = self;
+        let Warp { displaced, moved, losers, .. } = self;
         let layout = store.layout;
         let cells = &mut Cells::of(store);
-        for band in moved.iter_mut() {
-            losers.append(&mut band.losers);
-            free.append(&mut band.free);
-        }
+        moved.iter_mut().for_each(|band| losers.append(&mut band.losers));
+        let everywhere = &(0..layout.plane as u32);
         for (cell, mover) in moved.iter_mut().flat_map(|band| band.early.drain(..)) {
-            put_down(cells, cell as usize, &mover, losers, free);
+            let mut losing = Losing { layout: &layout, lifted: everywhere, first: 0, losers };
+            put_down(cells, cell as usize, &mover.moving(), &mut losing);
         }
-        for mover in displaced.drain(..) {
-            match layout.of_px(mover.px) {
-                Some(cell) => put_down(cells, cell, &mover, losers, free),
-                None => free.push(mover.slot),
+        for (i, mover) in displaced.iter().enumerate() {
+            if let Some(later) = displaced.get(i + AHEAD)
+                && let Some(cell) = layout.of_px(later.record.px())
+            {
+                cells.prefetch(cell);
+            }
+            if let Some(cell) = layout.of_px(mover.record.px()) {
+                let mut losing = Losing { layout: &layout, lifted: everywhere, first: 0, losers };
+                put_down(cells, cell, &mover.moving(), &mut losing);
             }
         }
+        displaced.clear();
     }
 
     /// Who lost its cell to a sample of the same surface goes to the one beside it, if that is empty.
     fn step_aside(&mut self, store: &mut Store) {
-        let layout = store.layout;
         let cells = &mut Cells::of(store);
-        let n = layout.per_side as f32;
-        for loser in self.losers.drain(..) {
-            // Positions in the picture are not negative.
-            let [fx, fy] = loser.px.map(|p| p * n - (p * n) as i32 as f32 - 0.5);
-            let sideways = fx.abs() > fy.abs();
-            let dx = if sideways { fx.signum() / n } else { 0.0 };
-            let dy = if sideways { 0.0 } else { fy.signum() / n };
-            let beside = layout.of_px([loser.px[0] + dx, loser.px[1] + dy]);
-            match beside.filter(|&cell| cells.is_empty(cell)) {
-                Some(cell) => put(cells, cell, &loser, &mut self.free),
-                None => self.free.push(loser.slot),
+        for (i, (cell, loser)) in self.losers.iter().enumerate() {
+            if let Some((later, _)) = self.losers.get(i + AHEAD) {
+                cells.prefetch(*later as usize);
+            }
+            if cells.is_empty(*cell as usize) {
+                cells.touched.mark_px(loser.record.px());
+                put(cells, *cell as usize, &loser.moving());
             }
         }
-    }
-
-    /// Every cell has a slot again.
-    fn give_back_slots(&mut self, store: &mut Store) {
-        for start in self.moved.iter_mut().flat_map(|band| band.starts.drain(..)) {
-            let start = start as usize;
-            for slot in &mut store.slot[start..start + 8] {
-                if *slot == NO_SLOT {
-                    *slot = self.free.pop().expect("as many slots as cells");
-                }
-            }
-        }
-        store.spare.append(&mut self.free);
+        self.losers.clear();
     }
 }
 
@@ -198,61 +209,81 @@ fn with<T, R>(shared: &Mutex<T>, work: impl FnOnce(&mut T) -> R) -> R {
     work(&mut shared.lock().unwrap_or_else(|poisoned| poisoned.into_inner()))
 }
 
-/// One sample to its new cell, if it stays there.
-#[inline(always)]
-fn put_down(
-    cells: &mut Cells<'_>,
-    cell: usize,
-    mover: &Mover,
-    losers: &mut Vec<Mover>,
-    free: &mut Vec<u32>,
-) {
-    if cells.is_empty(cell) {
-        return put(cells, cell, mover, free);
-    }
-    let there = cells.depth[cell];
-    let on_screen = cells.object[cell] == SCREEN;
-    if !on_screen && mover.depth < there * (1.0 - SAME_SURFACE) {
-        return put(cells, cell, mover, free);
-    }
-    if !on_screen && mover.depth > there * (1.0 + SAME_SURFACE) {
-        return free.push(mover.slot);
-    }
-    if mover.tick.wrapping_sub(cells.tick[cell]) as i32 > 0 {
-        losers.push(take(cells, cell));
-        put(cells, cell, mover, free);
-    } else {
-        losers.push(*mover);
+/// What becomes of those that lose their cells.
+struct Losing<'a> {
+    layout: &'a Layout,
+    /// Cells of the first sub-grid, and those above them in others: whoever is in one of these now is there to stay, or somebody else is.
+    lifted: &'a Range<u32>,
+    /// The number of the first of the cells.
+    first: usize,
+    losers: &'a mut Vec<Loser>,
+}
+
+impl Losing<'_> {
+    /// Nobody goes where somebody is already.
+    #[inline(always)]
+    fn push(&mut self, cells: &Cells<'_>, loser: &Mover) {
+        let Some(cell) = beside(self.layout, loser.record.px()) else { return };
+        let is_lifted = self.lifted.contains(&(self.layout.in_plane(cell) as u32));
+        if !is_lifted || cells.is_empty(cell - self.first) {
+            self.losers.push((cell as u32, *loser));
+        }
     }
 }
 
-/// The sample in a cell, which then has no slot.
+/// The cell beside the one of a position in the picture, on its side.
 #[inline(always)]
-fn take(cells: &mut Cells<'_>, cell: usize) -> Mover {
+fn beside(layout: &Layout, [x, y]: [f32; 2]) -> Option<usize> {
+    let n = layout.per_side as f32;
+    // Positions in the picture are not negative.
+    let [fx, fy] = [x, y].map(|p| p * n - (p * n) as i32 as f32 - 0.5);
+    let sideways = fx.abs() > fy.abs();
+    let dx = if sideways { fx.signum() / n } else { 0.0 };
+    let dy = if sideways { 0.0 } else { fy.signum() / n };
+    layout.of_px([x + dx, y + dy])
+}
+
+/// One sample to its new cell, if it stays there.
+#[inline(always)]
+fn put_down(cells: &mut Cells<'_>, cell: usize, mover: &Moving<'_>, losing: &mut Losing<'_>) {
+    cells.touched.mark_px(mover.record.px());
+    if cells.is_empty(cell) {
+        return put(cells, cell, mover);
+    }
+    let (here, there) = (mover.record.depth(), cells.record[cell].depth());
+    let on_screen = cells.object[cell] == SCREEN;
+    if !on_screen && here < there * (1.0 - SAME_SURFACE) {
+        return put(cells, cell, mover);
+    }
+    if !on_screen && here > there * (1.0 + SAME_SURFACE) {
+        return;
+    }
+    if mover.record.tick().is_later_than(cells.record[cell].tick()) {
+        losing.push(cells, &at(cells, cell));
+        put(cells, cell, mover);
+    } else {
+        losing.push(cells, &mover.mover());
+    }
+}
+
+/// The sample in a cell.
+#[inline(always)]
+fn at(cells: &Cells<'_>, cell: usize) -> Mover {
     Mover {
-        px: [cells.px[0][cell], cells.px[1][cell]],
-        depth: cells.depth[cell],
-        rgb: [cells.rgb[0][cell], cells.rgb[1][cell], cells.rgb[2][cell]],
-        tick: cells.tick[cell],
+        record: cells.record[cell],
+        surfel: cells.surfel[cell],
+        lit: cells.lit[cell],
         object: cells.object[cell],
-        slot: std::mem::replace(&mut cells.slot[cell], NO_SLOT),
-        anchor: cells.anchor[cell],
     }
 }
 
 /// Into a cell, instead of who is there.
 #[inline(always)]
-fn put(cells: &mut Cells<'_>, cell: usize, mover: &Mover, free: &mut Vec<u32>) {
-    [cells.px[0][cell], cells.px[1][cell]] = mover.px;
-    cells.depth[cell] = mover.depth;
-    (0..3).for_each(|k| cells.rgb[k][cell] = mover.rgb[k]);
-    cells.tick[cell] = mover.tick;
+fn put(cells: &mut Cells<'_>, cell: usize, mover: &Moving<'_>) {
+    cells.record[cell] = *mover.record;
+    cells.surfel[cell] = *mover.surfel;
     cells.object[cell] = mover.object;
-    cells.anchor[cell] = mover.anchor;
-    let before = std::mem::replace(&mut cells.slot[cell], mover.slot);
-    if before != NO_SLOT {
-        free.push(before);
-    }
+    cells.lit[cell] = *mover.lit;
 }
 
 #[cfg(test)]
@@ -271,10 +302,9 @@ mod tests {
         Pose { picture_from_object: vec![projection], ..Pose::default() }
     }
 
-    fn assert_nobody_shares_a_slot(store: &Store) {
-        let mut slots: Vec<u32> = store.slot.iter().chain(&store.spare).copied().collect();
-        slots.sort_unstable();
-        assert!(slots.into_iter().eq(0..store.shade.len() as u32));
+    fn sample_at(x: f32, tick: u32) -> (Record, Surfel) {
+        let record = Record([x, 0.5, 0.0, f32::from_bits(tick), 0.0, 0.0, 0.0, 0.0]);
+        (record, Surfel([x, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
     }
 
     /// Samples of object 0 at positions x of a row of eight pixels, each newer than the one before, where a pose that makes everything
@@ -284,13 +314,11 @@ mod tests {
         for (tick, &x) in (1..).zip(positions) {
             let cell = store.layout.of_px([x, 0.5]).expect("inside");
             store.object[cell] = 0;
-            store.tick[cell] = tick;
-            store.anchor[cell] = Anchor([x, 0.5, 0.0, 0.0]);
+            (store.record[cell], store.surfel[cell]) = sample_at(x, tick);
         }
         Warp::default().run(&mut store, &pose(0.5, 0.0), 1, |_| false);
-        assert_nobody_shares_a_slot(&store);
         let cell = |x| store.layout.of_pixel(x, 0);
-        let sample = |x| (store.tick[cell(x)], store.px[0][cell(x)]);
+        let sample = |x| (store.tick(cell(x)).0, store.record[cell(x)].px()[0]);
         (0..8).map(|x| (!store.is_empty(cell(x))).then(|| sample(x))).collect()
     }
 
@@ -301,8 +329,8 @@ mod tests {
         let (old, gone) = (cell(&store, 1.5), cell(&store, 7.5));
         for (i, x) in [(old, 1.5), (gone, 7.5)] {
             store.object[i] = 0;
-            store.anchor[i] = Anchor([x, 0.5, 0.0, 0.0]);
-            store.shade[store.slot[i] as usize].lit = 7;
+            (store.record[i], store.surfel[i]) = sample_at(x, 1);
+            store.lit[i].lit = 7;
         }
         let mut warp = Warp::default();
         for i in [old, gone] {
@@ -313,9 +341,8 @@ mod tests {
         // Three to the right: one of the two leaves the picture.
         warp.run(&mut store, &pose(1.0, 3.0), 1, |object| object == SCREEN);
         let now = cell(&store, 4.5);
-        assert_eq!((store.object[now], store.px[0][now], store.shade(now).lit), (0, 4.5, 7));
+        assert_eq!((store.object[now], store.record[now].px()[0], store.lit[now].lit), (0, 4.5, 7));
         assert_eq!((store.object[old], store.object[gone]), (SCREEN, SCREEN));
-        assert_nobody_shares_a_slot(&store);
     }
 
     #[test]
@@ -326,5 +353,118 @@ mod tests {
         assert_eq!(halved(&[0.5, 1.5])[..2], [Some((2, 0.75)), None]);
         // And here the cell to the right is taken.
         assert_eq!(halved(&[1.5, 0.5, 2.5])[..3], [Some((2, 0.25)), Some((3, 1.25)), None]);
+    }
+
+    const SIZE: Size = Size { width: 64, height: 48 };
+    const FOCAL_PX: f64 = 60.0;
+    const MIDDLE: [f64; 2] = [32.0, 24.0];
+    /// Of the plane, and of the sphere's centre, before the camera.
+    const AWAY: f64 = 5.0;
+
+    /// Where a camera at the origin that looks along −z sees a point.
+    fn seen([x, y, z]: [f64; 3], zoom: f64) -> [f64; 2] {
+        [MIDDLE[0] - zoom * FOCAL_PX * x / z, MIDDLE[1] + zoom * FOCAL_PX * y / z]
+    }
+
+    /// The point that is seen through a pixel's centre: on the plane z = −[`AWAY`], or on the unit sphere before it.
+    fn hit(x: u32, y: u32, on_sphere: bool) -> Option<[f64; 3]> {
+        let centre = [x, y].map(|p| f64::from(p) + 0.5);
+        let ray = [(centre[0] - MIDDLE[0]) / FOCAL_PX, (MIDDLE[1] - centre[1]) / FOCAL_PX, -1.0];
+        let length2: f64 = ray.iter().map(|d| d * d).sum();
+        // |t · ray − centre|² = 1
+        let root = (AWAY * AWAY - length2 * (AWAY * AWAY - 1.0)).sqrt();
+        let t = if on_sphere { (AWAY - root) / length2 } else { AWAY };
+        t.is_finite().then(|| ray.map(|d| t * d))
+    }
+
+    /// Carries what is hit through every second pixel by `projection`, and says how much of what should be inside the picture is found
+    /// where `expected` says.
+    fn share_found(
+        on_sphere: bool,
+        projection: [[f64; 4]; 4],
+        expected: impl Fn([f64; 3]) -> [f64; 2],
+    ) -> f64 {
+        let mut store = Store::new(SIZE, 1);
+        let mut wanted = Vec::new();
+        for (x, y) in (0..48).step_by(2).flat_map(|y| (0..64).step_by(2).map(move |x| (x, y))) {
+            let Some(point) = hit(x, y, on_sphere) else { continue };
+            let cell = store.layout.of_pixel(x as i32, y as i32);
+            let mut surfel = Surfel::default();
+            (0..3).for_each(|k| surfel.0[k] = point[k] as f32);
+            (store.object[cell], store.surfel[cell]) = (0, surfel);
+            let tick = f32::from_bits(wanted.len() as u32);
+            store.record[cell] = Record([0.0, 0.0, 0.0, tick, 0.0, 0.0, 0.0, 0.0]);
+            wanted.push(expected(point));
+        }
+        let projection = Projection(projection.map(|row| row.map(|number| number as f32)));
+        let pose = Pose { picture_from_object: vec![projection], ..Pose::default() };
+        Warp::default().run(&mut store, &pose, 1, |_| false);
+        let mut found = 0.0;
+        for cell in (0..store.layout.len()).filter(|&cell| !store.is_empty(cell)) {
+            let (px, wanted) = (store.record[cell].px(), wanted[store.tick(cell).0 as usize]);
+            let off = (0..2).map(|k| (f64::from(px[k]) - wanted[k]).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-3, "at {px:?} instead of {wanted:?}");
+            found += 1.0;
+        }
+        let inside = |px: &&[f64; 2]| (0.0..64.0).contains(&px[0]) && (0.0..48.0).contains(&px[1]);
+        found / wanted.iter().filter(inside).count() as f64
+    }
+
+    /// [`seen`] as a matrix, after the camera has moved by `by` to the right and has been turned to the right.
+    fn camera(by: f64, turn_rad: f64, zoom: f64) -> [[f64; 4]; 4] {
+        let (sin, cos) = turn_rad.sin_cos();
+        // Rows of the camera's coordinates from the world's.
+        let right = [cos, 0.0, sin, -by * cos];
+        let up = [0.0, 1.0, 0.0, 0.0];
+        let back = [-sin, 0.0, cos, by * sin];
+        let (f, [mx, my]) = (zoom * FOCAL_PX, MIDDLE);
+        let sum = |a: f64, row: [f64; 4], b: f64| std::array::from_fn(|k| a * row[k] - b * back[k]);
+        [sum(f, right, mx), sum(-f, up, my), sum(0.0, up, 1.0), sum(0.0, up, 1.0)]
+    }
+
+    #[test]
+    fn samples_of_a_plane_and_a_sphere_go_where_geometry_says() {
+        for on_sphere in [false, true] {
+            // A step to the right: all that is as far away moves as far to the left.
+            let found = share_found(on_sphere, camera(0.25, 0.0, 1.0), |[x, y, z]| {
+                let [column, row] = seen([x, y, z], 1.0);
+                [column + 0.25 * FOCAL_PX / z, row]
+            });
+            assert!(found > 0.9, "{found}");
+            // A turn to the right takes its angle from that to every point.
+            let found = share_found(on_sphere, camera(0.0, 0.1, 1.0), |[x, y, z]| {
+                let (angle, distance) = (x.atan2(-z) - 0.1, x.hypot(z));
+                seen([distance * angle.sin(), y, -distance * angle.cos()], 1.0)
+            });
+            assert!(found > 0.9, "{found}");
+            // A zoom takes everything away from the middle.
+            let found = share_found(on_sphere, camera(0.0, 0.0, 1.3), |point| {
+                let px = seen(point, 1.0);
+                std::array::from_fn(|k| MIDDLE[k] + 1.3 * (px[k] - MIDDLE[k]))
+            });
+            assert!(found > 0.9, "{found}");
+        }
+    }
+
+    #[test]
+    fn samples_of_a_turning_sphere_go_where_geometry_says() {
+        let turn_rad: f64 = 0.2;
+        let (sin, cos) = turn_rad.sin_cos();
+        // About its own axis, at z = −AWAY.
+        let turned = |k: usize| match k {
+            0 => [cos, 0.0, sin, AWAY * sin],
+            1 => [0.0, 1.0, 0.0, 0.0],
+            2 => [-sin, 0.0, cos, AWAY * cos - AWAY],
+            _ => [0.0, 0.0, 0.0, 1.0],
+        };
+        let camera = camera(0.0, 0.0, 1.0);
+        let whole =
+            camera.map(|row| std::array::from_fn(|k| (0..4).map(|j| row[j] * turned(j)[k]).sum()));
+        let found = share_found(true, whole, |[x, y, z]| {
+            // Longitude from the axis towards the camera, and distance from the axis.
+            let (longitude, radius) = (x.atan2(z + AWAY) + turn_rad, x.hypot(z + AWAY));
+            seen([radius * longitude.sin(), y, radius * longitude.cos() - AWAY], 1.0)
+        });
+        assert!(found > 0.7, "{found}");
     }
 }

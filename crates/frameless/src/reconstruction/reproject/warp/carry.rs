@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use super::{GONE_PX, Moved, Mover, NO_SLOT, NOWHERE, put_down};
+use super::{GONE_PX, Losing, Moved, Moving, NOWHERE, put_down};
 use crate::pose::BEHIND;
 use crate::reconstruction::reproject::cells::Cells;
-use crate::reconstruction::reproject::store::{Anchor, EMPTY, Layout};
+use crate::reconstruction::reproject::store::{EMPTY, Layout, Lit, Record, Surfel, rows_of};
 use crate::wide::{self, F8, M8, Unit};
 use crate::{Pose, Surface, Window};
 
@@ -47,29 +47,20 @@ struct Row {
 struct Eight {
     /// A bit per lane: whose sample moves.
     lanes: u32,
-    /// Where it is now: the cell, [`NOWHERE`] outside the picture, the position in pixels, the depth.
+    /// Where it is now; [`NOWHERE`] outside the picture.
     cell: [u32; 8],
-    px: [[f32; 8]; 2],
-    depth: [f32; 8],
-    rgb: [[f32; 8]; 3],
-    tick: [u32; 8],
+    /// With the position and the depth that it has now.
+    record: [Record; 8],
+    surfel: [Surfel; 8],
+    lit: [Lit; 8],
     object: [u32; 8],
-    slot: [u32; 8],
-    anchor: [Anchor; 8],
 }
 
 impl Eight {
     #[inline(always)]
-    fn mover(&self, lane: usize) -> Mover {
-        Mover {
-            px: [self.px[0][lane], self.px[1][lane]],
-            depth: self.depth[lane],
-            rgb: [self.rgb[0][lane], self.rgb[1][lane], self.rgb[2][lane]],
-            tick: self.tick[lane],
-            object: self.object[lane],
-            slot: self.slot[lane],
-            anchor: self.anchor[lane],
-        }
+    fn moving(&self, lane: usize) -> Moving<'_> {
+        let (record, surfel, lit) = (&self.record[lane], &self.surfel[lane], &self.lit[lane]);
+        Moving { record, surfel, lit, object: self.object[lane] }
     }
 }
 
@@ -115,14 +106,17 @@ impl<F: Fn(u32) -> bool> Carry<'_, F> {
         for sub in 0..self.layout.subs() {
             let row = self.layout.of_pixel(0, y) + sub * plane - self.band.first;
             for x in (0..size.width as usize).step_by(8) {
-                self.lift_eight::<U>(row + x, turn);
+                if self.lift_eight::<U>(row + x, turn) {
+                    self.band.cells.touched.mark(x as u32, y as u32);
+                }
             }
         }
     }
 
+    /// Whether any sample of the eight cells from `start` on moves.
     #[inline(always)]
-    fn lift_eight<U: Unit>(&mut self, start: usize, turn: usize) {
-        let Band { cells, first, moved, .. } = &mut self.band;
+    fn lift_eight<U: Unit>(&mut self, start: usize, turn: usize) -> bool {
+        let cells = &mut self.band.cells;
         let objects = M8::<U>::load(cells.object, start);
         let mut waiting = objects.equals(M8::splat(EMPTY)).not();
         let mut moving = M8::splat(0);
@@ -140,33 +134,31 @@ impl<F: Fn(u32) -> bool> Carry<'_, F> {
             }
         }
         if moving.any() {
-            moved.starts.push((*first + start) as u32);
             let to = cells_at(&self.layout, there.px);
             lift(cells, start, moving, &there, to, self.lifted.0[turn].next());
         }
+        moving.any()
     }
 
     /// `lifted`: the rows that have been lifted so far.
     #[inline(always)]
     fn put_down_row(&mut self, turn: usize, lifted: Range<i32>) {
         let Band { cells, first, moved, .. } = &mut self.band;
-        let Moved { early, losers, free, .. } = &mut **moved;
-        let plane = self.layout.plane as u32;
+        let Moved { early, losers } = &mut **moved;
         let here = self.layout.row(lifted.start) as u32..self.layout.row(lifted.end) as u32;
+        let (layout, first) = (&self.layout, *first);
+        let mut losing = Losing { layout, lifted: &here, first, losers };
         let row = &self.lifted.0[turn];
         for eight in &row.eights[..row.len] {
             let mut lanes = eight.lanes;
             while lanes != 0 {
                 let lane = lanes.trailing_zeros() as usize;
                 lanes &= lanes - 1;
-                let (cell, mover) = (eight.cell[lane], eight.mover(lane));
-                let in_plane = if cell < plane { cell } else { cell % plane };
-                if here.contains(&in_plane) {
-                    put_down(cells, cell as usize - *first, &mover, losers, free);
-                } else if cell == NOWHERE {
-                    free.push(mover.slot);
-                } else {
-                    early.push((cell, mover));
+                let (cell, moving) = (eight.cell[lane], eight.moving(lane));
+                if here.contains(&(layout.in_plane(cell as usize) as u32)) {
+                    put_down(cells, cell as usize - first, &moving, &mut losing);
+                } else if cell != NOWHERE {
+                    early.push((cell, moving.mover()));
                 }
             }
         }
@@ -183,20 +175,19 @@ fn lift<U: Unit>(
     to: M8<U>,
     eight: &mut Eight,
 ) {
-    let (object, slot) = (M8::load(cells.object, start), M8::load(cells.slot, start));
+    let object = M8::load(cells.object, start);
     M8::splat(EMPTY).or(moving, object).store(cells.object, start);
-    M8::splat(NO_SLOT).or(moving, slot).store(cells.slot, start);
     eight.lanes = moving.bits();
     eight.cell = to.lanes();
-    eight.px = [there.px[0].lanes(), there.px[1].lanes()];
-    eight.depth = there.depth.lanes();
-    for (rgb, plane) in eight.rgb.iter_mut().zip(&cells.rgb) {
-        rgb.copy_from_slice(&plane[start..start + 8]);
-    }
-    eight.tick.copy_from_slice(&cells.tick[start..start + 8]);
     eight.object = object.lanes();
-    eight.slot = slot.lanes();
-    eight.anchor.copy_from_slice(&cells.anchor[start..start + 8]);
+    let (records, _) = cells.record[start..start + 8].as_chunks::<8>();
+    let [column, row] = there.px;
+    let moved = F8::with_first([column, row, there.depth], rows_of(&records[0]));
+    for (record, moved) in eight.record.iter_mut().zip(moved) {
+        *record = Record(moved);
+    }
+    eight.surfel.copy_from_slice(&cells.surfel[start..start + 8]);
+    eight.lit.copy_from_slice(&cells.lit[start..start + 8]);
 }
 
 /// The eight samples from `start` on, as if all were of the same object.
@@ -211,8 +202,9 @@ fn carry_eight<U: Unit>(cells: &Cells<'_>, pose: &Pose, object: u32, start: usiz
         object => pose.picture_from_object.get(object as usize),
     };
     let Some(projection) = projection else { return There { px: [gone; 2], depth: gone } };
-    let (anchors, _) = cells.anchor[start..start + 8].as_chunks::<8>();
-    let [x, y, z, _] = F8::columns(anchors[0].each_ref().map(|anchor| &anchor.0));
+    let (surfels, _) = cells.surfel[start..start + 8].as_chunks::<8>();
+    let [a, b, c, d, e, f, g, h] = &surfels[0];
+    let [x, y, z, _] = F8::first_columns([&a.0, &b.0, &c.0, &d.0, &e.0, &f.0, &g.0, &h.0]);
     let row = |k: usize| {
         let [a, b, c, d] = projection.0[k];
         F8::splat(a) * x + F8::splat(b) * y + (F8::splat(c) * z + F8::splat(d))
