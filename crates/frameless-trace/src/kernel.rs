@@ -43,8 +43,28 @@ impl Isa {
     }
 }
 
+/// Eight numbers at once. Comparisons answer with a bit per lane; none holds of NaN.
+pub(crate) trait Eight: Copy {
+    fn splat(x: f32) -> Self;
+    fn load(from: &[f32; 8]) -> Self;
+    fn store(self) -> [f32; 8];
+    fn add(self, other: Self) -> Self;
+    fn sub(self, other: Self) -> Self;
+    fn mul(self, other: Self) -> Self;
+    fn div(self, other: Self) -> Self;
+    /// The other if one is NaN, as `minps`.
+    fn min(self, other: Self) -> Self;
+    /// The other if one is NaN, as `maxps`.
+    fn max(self, other: Self) -> Self;
+    /// self ≤ other.
+    fn at_most(self, other: Self) -> u32;
+    fn equals(self, other: Self) -> u32;
+}
+
 /// The two tests. Implementors differ in speed only.
 pub(crate) trait Kernel {
+    type Eight: Eight;
+
     /// Bit i: the ray meets box i at some t in [0, t_max]; and each child with where its box is entered.
     fn boxes(node: &Node, ray: &SlabRay, t_max: f32) -> (u32, [Entry; 8]);
 
@@ -144,7 +164,72 @@ fn is_inside(u: f32, v: f32, w: f32) -> bool {
     min(u, min(v, w)) >= 0.0 || max(u, max(v, w)) <= 0.0
 }
 
+/// Eight numbers for every processor.
+#[derive(Clone, Copy)]
+pub(crate) struct PortableEight([f32; 8]);
+
+impl PortableEight {
+    #[inline(always)]
+    fn zip(self, other: Self, op: impl Fn(f32, f32) -> f32) -> Self {
+        PortableEight(std::array::from_fn(|lane| op(self.0[lane], other.0[lane])))
+    }
+
+    #[inline(always)]
+    fn compare(self, other: Self, op: impl Fn(&f32, &f32) -> bool) -> u32 {
+        (0..8).map(|lane| u32::from(op(&self.0[lane], &other.0[lane])) << lane).sum()
+    }
+}
+
+impl Eight for PortableEight {
+    #[inline(always)]
+    fn splat(x: f32) -> Self {
+        PortableEight([x; 8])
+    }
+    #[inline(always)]
+    fn load(from: &[f32; 8]) -> Self {
+        PortableEight(*from)
+    }
+    #[inline(always)]
+    fn store(self) -> [f32; 8] {
+        self.0
+    }
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip(other, |a, b| a + b)
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.zip(other, |a, b| a - b)
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.zip(other, |a, b| a * b)
+    }
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.zip(other, |a, b| a / b)
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.zip(other, min)
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.zip(other, max)
+    }
+    #[inline(always)]
+    fn at_most(self, other: Self) -> u32 {
+        self.compare(other, f32::le)
+    }
+    #[inline(always)]
+    fn equals(self, other: Self) -> u32 {
+        self.compare(other, f32::eq)
+    }
+}
+
 impl Kernel for Portable {
+    type Eight = PortableEight;
+
     #[inline(always)]
     fn boxes(node: &Node, ray: &SlabRay, t_max: f32) -> (u32, [Entry; 8]) {
         let plane = |axis: usize, far: usize, lane: usize| {

@@ -27,6 +27,7 @@ mod matter;
 mod moment;
 mod numbers;
 mod order;
+mod packet;
 mod pages;
 mod patch;
 mod path;

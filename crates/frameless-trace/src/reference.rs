@@ -9,6 +9,7 @@ use glam::{DVec3, Vec3, Vec3A};
 use crate::World;
 use crate::build::corners;
 use crate::kernel::{Isa, Kernel, Pack, Portable, ShearRay};
+use crate::packet::{Packet, TOGETHER};
 use crate::ray::{Hit, Ray};
 use crate::test_scenes as scenes;
 use crate::traverse::Stack;
@@ -347,6 +348,41 @@ fn portable_and_fastest_code_agree_bit_for_bit() {
     for ray in &rays {
         let fast = a.targets(&fast).occluded(ray, 1.0, &mut stack);
         assert_eq!(fast, b.targets(&portable).occluded(ray, 1.0, &mut stack), "{ray:?}");
+    }
+}
+
+#[test]
+fn rays_walked_together_find_what_each_finds_alone() {
+    let mut scene = Scene::clone(&scenes::mixed());
+    let soup = random_soup(&mut Rng::new(8), 2_000, 0.3);
+    scenes::add(&mut scene, Geometry::Mesh(soup), Transform::IDENTITY);
+    // Its edges are met exactly.
+    scenes::add(&mut scene, scenes::triangle_sphere(8, 12, 0), Transform::IDENTITY);
+    let scene = Arc::new(scene);
+    for isa in [Isa::detect(), Isa::Portable] {
+        let world = World::with_isa(scene.clone(), isa);
+        let moment = world.moment(0.0);
+        let (targets, mut stack) = (moment.targets(&world), Stack::new());
+        let mut rng = Rng::new(13);
+        let (mut hits, mut together) = (0, 0);
+        for _ in 0..300 {
+            // Around one direction from one point, from hardly apart to far apart; some groups are not full.
+            let origin = 5.0 * rng.unit_f32() * scenes::unit(&mut rng);
+            let target = 2.0 * rng.unit_f32() * scenes::unit(&mut rng) - origin;
+            let spread = 0.1 * rng.unit_f32() * rng.unit_f32() * target.length();
+            let count = 1 + rng.below(70) as usize;
+            let rays: Vec<Ray> =
+                (0..count).map(|_| ray(origin, target + spread * scenes::unit(&mut rng))).collect();
+            let mut found = vec![None; count];
+            targets.closest_of(&rays, &mut found, &mut stack);
+            let alone: Vec<_> = rays.iter().map(|ray| targets.closest(ray, &mut stack)).collect();
+            assert_eq!(found, alone);
+            hits += found.iter().flatten().count();
+            let groups = rays.as_chunks::<TOGETHER>().0;
+            together +=
+                groups.iter().filter(|rays| Packet::new::<Portable>(rays).is_some()).count();
+        }
+        assert!(hits > 2_000 && together > 100, "{hits} hits, {together} groups");
     }
 }
 

@@ -14,6 +14,7 @@ use crate::deforming::Deforming;
 #[cfg(target_arch = "x86_64")]
 use crate::kernel::avx2;
 use crate::kernel::{Isa, Kernel, Lanes, Pack, Portable, ShearRay, SlabRay};
+use crate::packet::{Packet, TOGETHER, Worth};
 use crate::ray::{Hit, Ray};
 use crate::sift::{NoSieve, Stops};
 use crate::sphere;
@@ -189,6 +190,7 @@ impl Top {
 }
 
 /// Everything that a ray may hit at one moment.
+#[derive(Clone, Copy)]
 pub(crate) struct Targets<'a> {
     pub(crate) top: &'a Top,
     pub(crate) placed: &'a [Placed],
@@ -203,6 +205,24 @@ impl Targets<'_> {
     #[inline]
     pub(crate) fn closest(&self, ray: &Ray, stack: &mut Stack) -> Option<Hit> {
         self.find::<false, _>(ray, Hit::NONE, NoSieve, stack)
+    }
+
+    /// The same of many rays: neighbours that go much the same way are walked together, and `found` says of each what is found for it alone.
+    pub(crate) fn closest_of(&self, rays: &[Ray], found: &mut [Option<Hit>], stack: &mut Stack) {
+        let (groups, rest) = rays.as_chunks::<TOGETHER>();
+        let mut worth = Worth::default();
+        let (found, rest_found) = found.split_at_mut(groups.len() * TOGETHER);
+        for (rays, found) in groups.iter().zip(found.chunks_mut(TOGETHER)) {
+            let group = Group { targets: self, rays, found, worth: &mut worth, stack };
+            match self.isa {
+                Isa::Portable => group.with::<Portable>(),
+                #[cfg(target_arch = "x86_64")]
+                Isa::Avx2(proof) => avx2::with(proof, group),
+            }
+        }
+        for (ray, found) in rest.iter().zip(rest_found) {
+            *found = self.closest(ray, stack);
+        }
     }
 
     /// Whether anything is hit at 0 < t < t_max.
@@ -225,6 +245,48 @@ impl Targets<'_> {
             Isa::Portable => walk.with::<Portable>(),
             #[cfg(target_arch = "x86_64")]
             Isa::Avx2(proof) => avx2::with(proof, walk),
+        }
+    }
+}
+
+/// Neighbours' ways through everything.
+struct Group<'a> {
+    targets: &'a Targets<'a>,
+    rays: &'a [Ray; TOGETHER],
+    found: &'a mut [Option<Hit>],
+    worth: &'a mut Worth,
+    stack: &'a mut Stack,
+}
+
+#[cfg(target_arch = "x86_64")]
+impl avx2::Task for Group<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        self.with::<avx2::Avx2>();
+    }
+}
+
+impl Group<'_> {
+    #[inline(always)]
+    fn with<K: Kernel>(self) {
+        let Group { targets, rays, found, worth, stack } = self;
+        let mut best = [Hit::NONE; TOGETHER];
+        let mut standing = targets.standing;
+        if let Some(tree) = standing
+            && worth.is_worth_trying()
+            && let Some(mut packet) = Packet::new::<K>(rays)
+        {
+            worth.learn(tree.walk_together::<K>(&mut packet, &mut best, stack));
+            standing = None;
+        }
+        for ((ray, found), none) in rays.iter().zip(found).zip(best) {
+            let targets = &Targets { standing, ..*targets };
+            *found = if standing.is_none() && targets.top.leaves.is_empty() {
+                none.found()
+            } else {
+                Walk::<_, false> { targets, ray, none, sieve: NoSieve, stack }.with::<K>()
+            };
         }
     }
 }

@@ -14,6 +14,8 @@ const ENTRIES: usize = (2 * STACK_PER_TREE).next_power_of_two();
 /// Nodes still to be visited: the top level's and, above them, one instance's.
 pub(crate) struct Stack {
     entries: [Entry; ENTRIES],
+    /// Per entry of a packet: eight times its parent's index, plus its slot there.
+    from: [u32; ENTRIES],
     length: usize,
 }
 
@@ -33,19 +35,19 @@ impl Entry {
     }
 
     #[inline(always)]
-    fn child(self) -> Child {
+    pub(crate) fn child(self) -> Child {
         Child::from_bits(self.0 as u32)
     }
 
     #[inline(always)]
-    fn near(self) -> f32 {
+    pub(crate) fn near(self) -> f32 {
         f32::from_bits((self.0 >> 32) as u32)
     }
 }
 
 impl Stack {
     pub(crate) fn new() -> Stack {
-        Stack { entries: [Entry::ROOT; ENTRIES], length: 0 }
+        Stack { entries: [Entry::ROOT; ENTRIES], from: [0; ENTRIES], length: 0 }
     }
 
     #[inline(always)]
@@ -71,6 +73,35 @@ impl Stack {
             place -= 1;
         }
         self.entries[place % ENTRIES] = entry;
+    }
+}
+
+/// For walks that have to know which slot of which node a child is in.
+impl Stack {
+    #[inline(always)]
+    pub(crate) fn length(&self) -> usize {
+        self.length
+    }
+
+    /// As [`Stack::insert`].
+    #[inline(always)]
+    pub(crate) fn insert_from(&mut self, base: usize, entry: Entry, from: usize) {
+        debug_assert!(self.length < ENTRIES, "the builder keeps trees within STACK_PER_TREE");
+        let mut place = self.length;
+        self.length += 1;
+        while place > base && self.entries[(place - 1) % ENTRIES] < entry {
+            self.entries[place % ENTRIES] = self.entries[(place - 1) % ENTRIES];
+            self.from[place % ENTRIES] = self.from[(place - 1) % ENTRIES];
+            place -= 1;
+        }
+        self.entries[place % ENTRIES] = entry;
+        self.from[place % ENTRIES] = from as u32;
+    }
+
+    #[inline(always)]
+    pub(crate) fn pop_from(&mut self) -> (Entry, usize) {
+        let entry = self.pop();
+        (entry, self.from[self.length % ENTRIES] as usize)
     }
 }
 

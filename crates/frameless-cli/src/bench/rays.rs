@@ -9,10 +9,10 @@ use std::sync::Arc;
 
 use frameless::Size;
 use frameless_scene::{Geometry, Limits, Scene, State};
-use frameless_trace::{Caster, World};
+use frameless_trace::{Caster, Hit, World};
 
 use self::embree::{Embree, EmbreeScene, HOW_TO_GET, Triangles};
-use self::sets::{Asks, Set, trace_ours};
+use self::sets::{Asks, Set, trace_ours, trace_together};
 use super::table::Row;
 use crate::args::BenchArgs;
 use crate::failure::Failure;
@@ -27,7 +27,7 @@ const INSTANCES: [u32; 3] = [1, 100, 10_000];
 const TOLERANCE: f32 = 1e-3;
 
 /// Rows `rays.<scene>.<set>.…`: `mrays_per_sec`, and with Embree `embree_mrays_per_sec`, `ratio_to_embree`, round by round, and
-/// `mismatches`, rays with another answer.
+/// `mismatches`, rays with another answer; and `packet_over_single`, rays traced together against the same one by one.
 pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
     let named = args.embree.as_deref();
     let embree = Embree::find(named).map_err(|e| Failure::bad_input(anyhow::anyhow!(e)))?;
@@ -146,6 +146,18 @@ impl Bench<'_> {
             }
             trace_theirs(theirs, set, theirs_found);
         }
+        if set.name == "primary-sorted" {
+            let mut together = vec![None; set.rays.len()];
+            for _ in 0..self.args.rounds {
+                let single = mrays_per_sec(set, || trace_ours(&mut caster, set, ours_found));
+                let packets =
+                    mrays_per_sec(set, || trace_together(&mut caster, set, &mut together));
+                speeds.packets_over_single.push(packets / single);
+            }
+            let t = together.iter().map(|hit: &Option<Hit>| hit.map_or(f32::INFINITY, |hit| hit.t));
+            let is_same = t.zip(&*ours_found).all(|(a, &b)| a == b);
+            assert!(is_same, "rays found something else together");
+        }
         let mismatches = theirs.map(|_| mismatches(ours_found, theirs_found));
         self.rows(&format!("rays.{scene}.{}", set.name), set, &speeds, mismatches)
     }
@@ -165,6 +177,9 @@ impl Bench<'_> {
             Row::new(format!("{name}.{what}"), unit, rounds, &conditions)
         };
         let mut rows = vec![row("mrays_per_sec", "Mrays/s", &speeds.ours)];
+        if !speeds.packets_over_single.is_empty() {
+            rows.push(row("packet_over_single", "ratio", &speeds.packets_over_single));
+        }
         let Some(mismatches) = mismatches else { return rows };
         rows.push(row("embree_mrays_per_sec", "Mrays/s", &speeds.theirs));
         if !speeds.theirs_in_eights.is_empty() {
@@ -185,6 +200,7 @@ struct Speeds {
     ours: Vec<f64>,
     theirs: Vec<f64>,
     theirs_in_eights: Vec<f64>,
+    packets_over_single: Vec<f64>,
 }
 
 fn trace_theirs(scene: &EmbreeScene<'_>, set: &Set, found: &mut [f32]) {

@@ -10,7 +10,7 @@
 use std::arch::x86_64::*;
 use std::ops::Range;
 
-use super::{Kernel, Lanes, Pack, Portable, SLAB_MARGIN, ShearRay, SlabRay};
+use super::{Eight, Kernel, Lanes, Pack, Portable, SLAB_MARGIN, ShearRay, SlabRay};
 use crate::traverse::Entry;
 use crate::wide::Node;
 
@@ -48,7 +48,66 @@ pub(crate) fn with<T: Task>(_proof: Detected, task: T) -> T::Output {
 /// Only for code that runs inside [`with`].
 pub(crate) struct Avx2;
 
+/// Eight numbers in a register.
+#[derive(Clone, Copy)]
+pub(crate) struct Avx2Eight(__m256);
+
+macro_rules! eight {
+    ($($name:ident: $intrinsic:ident;)*) => {$(
+        #[inline(always)]
+        fn $name(self, other: Self) -> Self {
+            // SAFETY: see the module.
+            Avx2Eight(unsafe { $intrinsic(self.0, other.0) })
+        }
+    )*};
+}
+
+impl Eight for Avx2Eight {
+    #[inline(always)]
+    fn splat(x: f32) -> Self {
+        // SAFETY: see the module.
+        Avx2Eight(unsafe { _mm256_set1_ps(x) })
+    }
+
+    #[inline(always)]
+    fn load(from: &[f32; 8]) -> Self {
+        // SAFETY: see the module.
+        Avx2Eight(unsafe { _mm256_loadu_ps(from.as_ptr()) })
+    }
+
+    #[inline(always)]
+    fn store(self) -> [f32; 8] {
+        let mut to = [0.0; 8];
+        // SAFETY: see the module.
+        unsafe { _mm256_storeu_ps(to.as_mut_ptr(), self.0) };
+        to
+    }
+
+    eight! {
+        add: _mm256_add_ps;
+        sub: _mm256_sub_ps;
+        mul: _mm256_mul_ps;
+        div: _mm256_div_ps;
+        min: _mm256_min_ps;
+        max: _mm256_max_ps;
+    }
+
+    #[inline(always)]
+    fn at_most(self, other: Self) -> u32 {
+        // SAFETY: see the module.
+        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)) as u32 }
+    }
+
+    #[inline(always)]
+    fn equals(self, other: Self) -> u32 {
+        // SAFETY: see the module.
+        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_EQ_OQ>(self.0, other.0)) as u32 }
+    }
+}
+
 impl Kernel for Avx2 {
+    type Eight = Avx2Eight;
+
     #[inline(always)]
     fn boxes(node: &Node, ray: &SlabRay, t_max: f32) -> (u32, [Entry; 8]) {
         // SAFETY: see the module.

@@ -1,0 +1,352 @@
+//! Sixteen rays from one point that go much the same way, walked together: a node is tested once for all of them, and a triangle for eight
+//! at a time.
+//!
+//! A node's boxes are tested against the beam that the rays form, by interval arithmetic: with o the origin and r in [r⁻, r⁺] the
+//! reciprocal directions, all of one sign, a plane p is met at (p − o)·r, which is least and greatest at r⁻ or r⁺. Rounding is monotonic, so
+//! that the bounds hold for what each ray alone would compute. What is found is the same, bit for bit, as for each ray alone: triangles are
+//! tested by the same operations, and which of several hits is best does not depend on their order.
+
+use glam::Vec3A;
+
+use crate::kernel::{Eight, Kernel, Pack, SLAB_MARGIN, ShearRay};
+use crate::ray::{Hit, Ray};
+use crate::top::take;
+use crate::traverse::{Entry, Stack};
+use crate::wide::{Child, Node};
+
+/// Rays that are walked together.
+pub(crate) const TOGETHER: usize = 16;
+/// Directions may differ by this much of their length per axis. More: neighbours part before they reach what they hit, and each node is
+/// visited for a few of them only.
+const WIDEST: f32 = 0.12;
+/// So many rays or fewer in a leaf's box test its triangles one by one, four triangles at a time.
+const FEW: u32 = 2;
+
+/// A leaf that fewer of its rays reach on average is cheaper one by one: then triangles are about as small as the rays are apart.
+const LEAST: u32 = 3;
+/// A try costs some percent of what it may save.
+const RESTS: u32 = 15;
+
+/// A number per ray, in halves.
+type PerRay = [[f32; 8]; 2];
+
+/// See the module.
+pub(crate) struct Packet {
+    origin: [f32; 3],
+    reciprocal: [PerRay; 3],
+    least_reciprocal: [f32; 3],
+    most_reciprocal: [f32; 3],
+    entry: [usize; 3],
+    /// As in [`ShearRay`].
+    shear: [PerRay; 3],
+    axes: [usize; 3],
+    /// Of what each ray has hit so far.
+    t_max: PerRay,
+}
+
+impl Packet {
+    /// `None` if they are better walked one by one.
+    #[inline(always)]
+    pub(crate) fn new<K: Kernel>(rays: &[Ray; TOGETHER]) -> Option<Packet> {
+        let first = &rays[0];
+        let (mut least, mut most, mut sum) = (first.direction, first.direction, Vec3A::ZERO);
+        for ray in rays {
+            if ray.origin != first.origin {
+                return None;
+            }
+            (least, most) = (least.min(ray.direction), most.max(ray.direction));
+            // Not finite if any of them is not.
+            sum += ray.direction;
+        }
+        let is_narrow = (most - least).max_element() <= WIDEST * first.direction.length();
+        if !(is_narrow && sum.is_finite() && first.is_traceable()) {
+            return None;
+        }
+        // Of one sign and not zero, so that reciprocals are finite.
+        let (smallest, largest) = (least.abs().min(most.abs()), least.abs().max(most.abs()));
+        let one_way = least.signum().cmpeq(most.signum()) & smallest.cmpgt(Vec3A::splat(1e-15));
+        let axes = ShearRay::new(first).axes;
+        let [kx, ky, kz] = axes;
+        // The axis along which all of them go farthest.
+        let is_one_axis = smallest[kz] > largest[kx] && smallest[kz] > largest[ky];
+        if !(one_way.all() && is_one_axis) {
+            return None;
+        }
+        let mut direction: [PerRay; 3] = [[[0.0; 8]; 2]; 3];
+        for (axis, per_ray) in direction.iter_mut().enumerate() {
+            for (to, ray) in per_ray.as_flattened_mut().iter_mut().zip(rays) {
+                *to = ray.direction[axis];
+            }
+        }
+        let mut packet = Packet {
+            origin: first.origin.to_array(),
+            reciprocal: [[[0.0; 8]; 2]; 3],
+            // Of one sign: the reciprocal falls as the direction grows.
+            least_reciprocal: most.recip().to_array(),
+            most_reciprocal: least.recip().to_array(),
+            entry: first.direction.to_array().map(|d| usize::from(d < 0.0)),
+            shear: [[[0.0; 8]; 2]; 3],
+            axes,
+            t_max: [[f32::MAX; 8]; 2],
+        };
+        let one = K::Eight::splat(1.0);
+        for half in [0, 1] {
+            for (axis, per_ray) in direction.iter().enumerate() {
+                let reciprocal = one.div(K::Eight::load(&per_ray[half]));
+                packet.reciprocal[axis][half] = reciprocal.store();
+            }
+            let z = K::Eight::load(&direction[kz][half]);
+            packet.shear[0][half] = K::Eight::load(&direction[kx][half]).div(z).store();
+            packet.shear[1][half] = K::Eight::load(&direction[ky][half]).div(z).store();
+            packet.shear[2][half] = packet.reciprocal[kz][half];
+        }
+        Some(packet)
+    }
+
+    /// One of the rays.
+    #[inline(always)]
+    fn one(&self, ray: usize) -> ShearRay {
+        let (half, lane) = (ray / 8 % 2, ray % 8);
+        let shear =
+            [self.shear[0][half][lane], self.shear[1][half][lane], self.shear[2][half][lane]];
+        ShearRay { origin: self.origin, axes: self.axes, shear }
+    }
+
+    // Small functions instead of closures, since those cannot be made to be inlined, and calls would cost more than what is in them.
+
+    /// The plane through which rays enter a child's box, or leave it, in the node's rows.
+    #[inline(always)]
+    fn row<'n>(&self, node: &'n Node, axis: usize, leaves: usize) -> &'n [f32; 8] {
+        &node.bounds[2 * axis + ((self.entry[axis] ^ leaves) & 1)]
+    }
+
+    /// The children that the beam meets before any of its rays has hit something, and where at the earliest.
+    #[inline(always)]
+    fn boxes<K: Kernel>(&self, node: &Node, t_max: f32) -> (u32, [f32; 8]) {
+        let (mut near, mut far) = (K::Eight::splat(0.0), K::Eight::splat(t_max));
+        for axis in 0..3 {
+            let origin = K::Eight::splat(self.origin[axis]);
+            let least = K::Eight::splat(self.least_reciprocal[axis]);
+            let most = K::Eight::splat(self.most_reciprocal[axis]);
+            let enters = K::Eight::load(self.row(node, axis, 0)).sub(origin);
+            let leaves = K::Eight::load(self.row(node, axis, 1)).sub(origin);
+            near = enters.mul(least).min(enters.mul(most)).max(near);
+            far = leaves.mul(least).max(leaves.mul(most)).min(far);
+        }
+        (near.at_most(far.mul(K::Eight::splat(SLAB_MARGIN))), near.store())
+    }
+
+    /// Bit i: ray i meets a child's box.
+    #[inline(always)]
+    fn rays_in<K: Kernel>(&self, node: &Node, slot: usize) -> u32 {
+        self.half_in::<K>(node, slot, 0) | self.half_in::<K>(node, slot, 1) << 8
+    }
+
+    #[inline(always)]
+    fn half_in<K: Kernel>(&self, node: &Node, slot: usize, half: usize) -> u32 {
+        let (mut near, mut far) = (K::Eight::splat(0.0), K::Eight::load(&self.t_max[half]));
+        for axis in 0..3 {
+            let reciprocal = K::Eight::load(&self.reciprocal[axis][half]);
+            let enters = self.row(node, axis, 0)[slot & 7] - self.origin[axis];
+            let leaves = self.row(node, axis, 1)[slot & 7] - self.origin[axis];
+            near = K::Eight::splat(enters).mul(reciprocal).max(near);
+            far = K::Eight::splat(leaves).mul(reciprocal).min(far);
+        }
+        near.at_most(far.mul(K::Eight::splat(SLAB_MARGIN)))
+    }
+
+    /// A corner of a triangle in the sheared space of eight rays.
+    #[inline(always)]
+    fn sheared<K: Kernel>(
+        &self,
+        corner: &[[f32; 4]; 3],
+        lane: usize,
+        half: usize,
+    ) -> [K::Eight; 3] {
+        let [kx, ky, kz] = self.axes;
+        let x = K::Eight::splat(corner[kx][lane & 3] - self.origin[kx]);
+        let y = K::Eight::splat(corner[ky][lane & 3] - self.origin[ky]);
+        let z = K::Eight::splat(corner[kz][lane & 3] - self.origin[kz]);
+        let sx = K::Eight::load(&self.shear[0][half]);
+        let sy = K::Eight::load(&self.shear[1][half]);
+        let sz = K::Eight::load(&self.shear[2][half]);
+        [x.sub(sx.mul(z)), y.sub(sy.mul(z)), sz.mul(z)]
+    }
+
+    /// One triangle of a pack and eight rays, as [`Kernel::triangles`] for each: which hit it, which have to be asked alone since they
+    /// meet an edge; and t and the weights of the second and third vertex.
+    #[inline(always)]
+    fn meet<K: Kernel>(&self, pack: &Pack, lane: usize, half: usize) -> (u32, u32, [K::Eight; 3]) {
+        let [ax, ay, az] = self.sheared::<K>(&pack.vertex[0], lane, half);
+        let [bx, by, bz] = self.sheared::<K>(&pack.vertex[1], lane, half);
+        let [cx, cy, cz] = self.sheared::<K>(&pack.vertex[2], lane, half);
+        let u = cx.mul(by).sub(cy.mul(bx));
+        let v = ax.mul(cy).sub(ay.mul(cx));
+        let w = bx.mul(ay).sub(by.mul(ax));
+        let zero = K::Eight::splat(0.0);
+        let (least, most) = (u.min(v.min(w)), u.max(v.max(w)));
+        let inside = zero.at_most(least) | most.at_most(zero);
+        if inside == 0 {
+            return (0, 0, [zero; 3]);
+        }
+        let on_edge = inside & (u.equals(zero) | v.equals(zero) | w.equals(zero));
+        let determinant = u.add(v).add(w);
+        let inverse = K::Eight::splat(1.0).div(determinant);
+        let t = u.mul(az).add(v.mul(bz)).add(w.mul(cz)).mul(inverse);
+        let in_range = !t.at_most(zero) & t.at_most(K::Eight::load(&self.t_max[half]));
+        let hit = inside & in_range & !determinant.equals(zero) & !on_edge;
+        (hit & 0xff, on_edge, [t, v.mul(inverse), w.mul(inverse)])
+    }
+}
+
+/// Whether walking together has been worth it lately: whoever walks one by one for a while tries again, since what lies ahead changes.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Worth {
+    /// Of the last groups, the older the less: leaves visited, and rays in their boxes.
+    leaves: u32,
+    rays: u32,
+    /// Groups that are walked one by one before the next try.
+    rests: u32,
+}
+
+impl Worth {
+    /// Whether the next group is to be walked together.
+    #[inline(always)]
+    pub(crate) fn is_worth_trying(&mut self) -> bool {
+        let rests = self.rests;
+        self.rests = rests.saturating_sub(1);
+        rests == 0
+    }
+
+    /// What came of it: leaves that were visited, and rays that were in their boxes.
+    #[inline(always)]
+    pub(crate) fn learn(&mut self, [leaves, rays]: [u32; 2]) {
+        self.leaves = self.leaves - self.leaves / 4 + leaves;
+        self.rays = self.rays - self.rays / 4 + rays;
+        if self.rays < LEAST * self.leaves {
+            self.rests = RESTS;
+        }
+    }
+}
+
+/// Brings `best` to the nearest hit of each ray; returns how many leaves were visited and how many rays were in them. `place`: instance and triangle of what is in the packs.
+#[inline(always)]
+pub(crate) fn walk_together<K: Kernel>(
+    (nodes, packs): (&[Node], &[Pack]),
+    packet: &mut Packet,
+    best: &mut [Hit; TOGETHER],
+    stack: &mut Stack,
+    place: impl Fn(u32) -> (u32, u32),
+) -> [u32; 2] {
+    let mut met = [0; 2];
+    let base = stack.length();
+    let mut farthest = f32::MAX;
+    let mut current = Child::ROOT;
+    let mut came_from = 0;
+    loop {
+        if current.is_leaf() {
+            let node = &nodes[came_from >> 3];
+            let rays = packet.rays_in::<K>(node, came_from & 7);
+            met = [met[0] + 1, met[1] + rays.count_ones()];
+            let mut found = false;
+            for pack in &packs[current.items()] {
+                found |= visit::<K>(pack, packet, rays, best, &place);
+            }
+            if found {
+                farthest = packet.t_max.as_flattened().iter().copied().fold(0.0, f32::max);
+            }
+        } else {
+            let index = current.node();
+            let node = &nodes[index];
+            let (mut mask, near) = packet.boxes::<K>(node, farthest);
+            let first = stack.length();
+            while mask != 0 {
+                let slot = mask.trailing_zeros() as usize & 7;
+                mask &= mask - 1;
+                stack.insert_from(
+                    first,
+                    Entry::new(node.child[slot], near[slot]),
+                    index << 3 | slot,
+                );
+            }
+        }
+        loop {
+            if stack.length() == base {
+                return met;
+            }
+            let (entry, from) = stack.pop_from();
+            if entry.near() <= farthest * SLAB_MARGIN {
+                (current, came_from) = (entry.child(), from);
+                break;
+            }
+        }
+    }
+}
+
+/// A pack against some of the rays. Whether any of them hit it.
+#[inline(always)]
+fn visit<K: Kernel>(
+    pack: &Pack,
+    packet: &mut Packet,
+    rays: u32,
+    best: &mut [Hit; TOGETHER],
+    place: &impl Fn(u32) -> (u32, u32),
+) -> bool {
+    let mut found = false;
+    if rays.count_ones() <= FEW {
+        alone::<K>(pack, packet, rays, best, place, &mut found);
+        return found;
+    }
+    for lane in 0..4 {
+        if lane > 0 && pack.primitive[lane] == pack.primitive[lane - 1] {
+            break;
+        }
+        for half in 0..2 {
+            if rays >> (8 * half) & 0xff == 0 {
+                continue;
+            }
+            let (mut hit, on_edge, [t, v, w]) = packet.meet::<K>(pack, lane, half);
+            if on_edge != 0 {
+                alone::<K>(pack, packet, on_edge << (8 * half), best, place, &mut found);
+            }
+            if hit == 0 {
+                continue;
+            }
+            let (instance, primitive) = place(pack.primitive[lane]);
+            let (t, v, w) = (t.store(), v.store(), w.store());
+            while hit != 0 {
+                let ray = hit.trailing_zeros() as usize & 7;
+                hit &= hit - 1;
+                let barycentric = [v[ray], w[ray]];
+                let hit = Hit { t: t[ray], barycentric, primitive, instance };
+                if hit.is_before(&best[8 * half + ray]) {
+                    best[8 * half + ray] = hit;
+                    packet.t_max[half][ray] = hit.t;
+                    found = true;
+                }
+            }
+        }
+    }
+    found
+}
+
+/// A pack against some rays, one by one.
+#[inline(always)]
+fn alone<K: Kernel>(
+    pack: &Pack,
+    packet: &mut Packet,
+    mut rays: u32,
+    best: &mut [Hit; TOGETHER],
+    place: &impl Fn(u32) -> (u32, u32),
+    found: &mut bool,
+) {
+    while rays != 0 {
+        let ray = rays.trailing_zeros() as usize % TOGETHER;
+        rays &= rays - 1;
+        let lanes = K::triangles(pack, &packet.one(ray), best[ray].t);
+        if lanes.mask != 0 && take::<false>(pack, &lanes, &mut best[ray], place, |_| true) {
+            packet.t_max[ray / 8][ray % 8] = best[ray].t;
+            *found = true;
+        }
+    }
+}
