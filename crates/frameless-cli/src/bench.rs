@@ -3,8 +3,11 @@
 mod display;
 mod edit;
 mod engine;
+mod latency;
+mod load;
 mod rays;
 mod sampler;
+mod scaling;
 mod still;
 mod table;
 
@@ -21,7 +24,18 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
         Benchmark::Edit => edit::measure(args)?,
         Benchmark::Rays => rays::measure(args)?,
         Benchmark::Still => still::measure(args)?,
+        Benchmark::Latency => latency::measure(args)?,
+        Benchmark::Scaling => scaling::measure(args)?,
+        Benchmark::Load => load::measure(args)?,
     };
     let text = if args.json { table::json(&rows) } else { table::plain(&rows) };
     Ok(output::print(&text)?)
+}
+
+/// Threads that trace, counted.
+fn threads(args: &BenchArgs) -> usize {
+    match args.threads {
+        0 => std::thread::available_parallelism().map_or(1, usize::from),
+        threads => threads,
+    }
 }

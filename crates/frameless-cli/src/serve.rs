@@ -67,7 +67,8 @@ fn show(look: &LookArgs) -> Result<Show<CpuTracer>, Failure> {
     let scene = Arc::new(scene);
     let prepare = |scene: &Arc<Scene>| Arc::new(World::new(Arc::clone(scene)));
     let camera = ViewSource::Camera(0);
-    let tracer = CpuTracer::new(prepare(&scene), camera, look.light.settings()?, look.threads);
+    let tracer = CpuTracer::new(prepare(&scene), camera, look.light.settings()?, look.threads)
+        .in_real_time();
     let size = settings.picture.size_in(FIRST_PLACE);
     Ok(Show {
         session: Session::new(size, Clock::real(), settings, look.seed, tracer)

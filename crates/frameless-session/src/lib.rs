@@ -30,6 +30,6 @@ pub use load::{Loading, Opener, Outcome};
 pub use overlay::{Colours, Drawn, Legend};
 pub use pace::Pace;
 pub use render_thread::{Ended, LOOP_THREAD, RenderThread};
-pub use session::{OwnSampler, Session, Stage};
+pub use session::{OwnSampler, Session, Stage, Steering};
 pub use settings::{Overlay, PictureSize, Settings};
 pub use shown::Ages;

@@ -30,6 +30,8 @@ const LONGEST_SECS: f64 = 1.0 / 20.0;
 const PAINT_SHARE: f64 = 0.25;
 // Of the loop's time, for making pictures. More starves the samples of which they are made.
 const REFRESH_SHARE: f64 = 0.42;
+// The same of pictures that are made beside the loop: samples have some of the machine meanwhile.
+const BESIDE_SHARE: f64 = 0.6;
 // The same of those that nobody waits for while somebody steers: an answer has to wait for the picture that is being made. The
 // smaller one as long as that leaves 20 Hz.
 const STEERED_SHARES: [f64; 2] = [1.0 / 4.0, 1.0 / 3.0];
@@ -77,6 +79,19 @@ impl Pace {
         let on_credit = Time::from_secs(self.owed_until.secs() - CREDIT_SECS);
         self.soonest = self.soonest.max(on_credit);
         self.due = self.due.max(after(now, unhurried_secs));
+    }
+
+    /// The same of a picture that was made beside the loop, in so many seconds.
+    pub fn made_beside(&mut self, now: Time, secs: f64) {
+        let rest_secs = secs * (1.0 / BESIDE_SHARE - 1.0);
+        self.due = self.due.max(Time::from_secs(now.secs() + rest_secs.min(LONGEST_REST_SECS)));
+        self.soonest = self.soonest.max(now);
+        self.owed_until = self.owed_until.max(now);
+    }
+
+    /// Whether somebody waits for the next picture.
+    pub fn is_hurried(&self) -> bool {
+        self.is_hurried
     }
 
     fn is_steered(&self, now: Time) -> bool {
@@ -220,6 +235,16 @@ mod tests {
         pace.made(ms(1050), 3.0);
         assert_eq!(pace.ahead_secs(ms(1060)), 0.0, "who has just done something will again");
         assert_eq!(pace.ahead_secs(ms(1600)), MOST_AHEAD_SECS);
+    }
+
+    #[test]
+    fn pictures_beside_the_loop_leave_the_samples_their_share() {
+        let mut pace = Pace::default();
+        assert!(pace.is_due(ms(1000)));
+        pace.made_beside(ms(1060), 0.06);
+        assert_eq!((1060..2000).find(|&now| pace.is_due(ms(now))), Some(1100));
+        pace.made_beside(ms(9000), 60.0);
+        assert!(pace.is_due(ms(10_000)));
     }
 
     #[test]

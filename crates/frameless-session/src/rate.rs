@@ -117,6 +117,14 @@ impl<T: Tracer> Tracer for Counted<T> {
         self.tracer.is_noisy()
     }
 
+    fn samples_at_once(&self) -> usize {
+        self.tracer.samples_at_once()
+    }
+
+    fn spare_threads(&mut self, threads: usize) {
+        self.tracer.spare_threads(threads);
+    }
+
     fn pose(&mut self, scene_secs: f64, size: Size, pose: &mut Pose) -> bool {
         self.tracer.pose(scene_secs, size, pose)
     }

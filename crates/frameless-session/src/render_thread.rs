@@ -6,9 +6,9 @@ use std::thread::{Builder, JoinHandle};
 
 use frameless::Time;
 
-use crate::command::{Command, Report};
+use crate::command::{Command, Report, ViewChoice};
 use crate::pace::Pace;
-use crate::session::{Session, Stage};
+use crate::session::{Session, Stage, Steering};
 
 /// The name of the thread that renderers are called in.
 pub const LOOP_THREAD: &str = "render loop";
@@ -18,6 +18,7 @@ pub struct RenderThread<W> {
     // Taken on drop: that the channel is closed is the sign to end.
     commands: Option<Sender<Command<W>>>,
     reports: Receiver<Report>,
+    steering: Option<Steering>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -36,14 +37,19 @@ impl<W: Send + 'static> RenderThread<W> {
     ) -> io::Result<RenderThread<W>> {
         let (to_loop, commands) = channel();
         let (to_window, reports) = channel();
+        let steering = session.steering();
         let thread = Builder::new()
             .name(LOOP_THREAD.to_owned())
             .spawn(move || run(session, &commands, &to_window, wake))?;
-        Ok(RenderThread { commands: Some(to_loop), reports, thread: Some(thread) })
+        Ok(RenderThread { commands: Some(to_loop), reports, steering, thread: Some(thread) })
     }
 
     /// Ask for something. Lost if the loop has ended, which [`RenderThread::report`] says.
     pub fn send(&self, command: Command<W>) {
+        // Input does not wait for the loop's next turn. Only what makes sense in any scene: the loop may be about to open another.
+        if let (Command::View(ViewChoice::Free(view)), Some(steer)) = (&command, &self.steering) {
+            steer(*view);
+        }
         if let Some(commands) = &self.commands {
             commands.send(command).ok();
         }
@@ -127,10 +133,24 @@ fn run<S: Stage>(
             next_error = Time::from_secs(session.now().secs() + SECS_BETWEEN_ERRORS);
             report(Report::Error(trouble));
         }
-        if wanted.is_some() && session.is_worth_showing() && pace.is_due(session.now()) {
+        if let Some((picture, secs)) = session.take_picture() {
+            pace.made_beside(session.now(), secs);
+            report(Report::Picture(picture));
+        }
+        let may = wanted.is_some() && session.is_worth_showing() && !session.is_making();
+        if may && pace.is_due(session.now()) {
             let begin = session.now();
+            let memory = wanted.take().unwrap_or_default();
+            // Who waits for an answer gets it from all threads.
+            let memory = match pace.is_hurried() {
+                true => memory,
+                false => match session.begin_picture(memory) {
+                    Ok(()) => continue,
+                    Err(memory) => memory,
+                },
+            };
             session.work_ahead(pace.ahead_secs(begin));
-            let picture = session.picture(wanted.take().unwrap_or_default());
+            let picture = session.picture(memory);
             let ready = session.now();
             pace.made(ready, ready.secs_since(begin));
             report(Report::Picture(picture));
@@ -141,6 +161,7 @@ fn run<S: Stage>(
 #[cfg(test)]
 mod tests {
     use frameless::{Clock, Size, ToneMap};
+    use frameless_scene::{Projection, View};
 
     use super::*;
     use crate::command::Picture;
@@ -148,9 +169,12 @@ mod tests {
     use crate::test_stage::Plain;
 
     fn start() -> RenderThread<f32> {
+        start_with(Plain::new(1.0))
+    }
+
+    fn start_with(plain: Plain) -> RenderThread<f32> {
         let settings = Settings { tone_map: ToneMap::None, ..Settings::default() };
-        let size = Size::new(16, 12);
-        let session = Session::new(size, Clock::real(), settings, 1, Plain::new(1.0));
+        let session = Session::new(Size::new(16, 12), Clock::real(), settings, 1, plain);
         RenderThread::start(session, || {}).unwrap()
     }
 
@@ -187,6 +211,19 @@ mod tests {
         thread.send(Command::Play(false));
         thread.send(Command::Mark(7));
         assert_eq!(picture(&thread).mark, 7);
+    }
+
+    #[test]
+    fn steering_does_not_wait_for_the_loop() {
+        let plain = Plain::new(1.0);
+        let steered = plain.steered.clone();
+        let thread = start_with(plain);
+        let projection = Projection::Perspective { yfov_rad: 1.0 };
+        let view = View { world_from_camera: Default::default(), projection };
+        thread.send(Command::View(ViewChoice::Camera(0)));
+        assert_eq!(*steered.lock().unwrap(), None, "the loop may be about to open another scene");
+        thread.send(Command::View(ViewChoice::Free(view)));
+        assert_eq!(*steered.lock().unwrap(), Some(view));
     }
 
     #[test]

@@ -2,16 +2,20 @@
 //!
 //! No thread and no window here: see `render_thread.rs`.
 
+use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
 use frameless::{
     AdaptiveOptions, Clock, Display, Engine, EngineError, ReconstructionKind, Sampler, SamplerKind,
     Size, Time, Tracer,
 };
+use frameless_scene::View;
 
 use crate::command::{Command, Picture, Status, ViewChoice};
 use crate::overlay::HeatMaps;
 use crate::rate::Counted;
 use crate::settings::{Overlay, Settings};
-use crate::shown::{self, Shown};
+use crate::shown::{self, Ages, Shown};
 
 /// A renderer that can be pointed at another scene or from another place.
 pub trait Stage: Tracer {
@@ -21,6 +25,11 @@ pub trait Stage: Tracer {
     /// Batches submitted from now on look from there.
     fn set_view(&mut self, view: ViewChoice);
 
+    /// How another thread moves the camera without waiting for the loop, before it tells the loop; `None`: not at all.
+    fn steering(&self) -> Option<Steering> {
+        None
+    }
+
     /// Batches submitted from now on show that scene.
     fn set_world(&mut self, world: Self::World);
 
@@ -29,6 +38,9 @@ pub trait Stage: Tracer {
         None
     }
 }
+
+/// Moves a renderer's camera to where the user has put it, from any thread.
+pub type Steering = Box<dyn Fn(View) + Send>;
 
 /// Makes a sampler that is none of [`SamplerKind`]'s.
 pub type OwnSampler = Box<dyn FnMut() -> Box<dyn Sampler> + Send>;
@@ -43,6 +55,19 @@ pub struct Session<S> {
     heat_maps: HeatMaps,
     throughput: Throughput,
     mark: u64,
+    is_beside: bool,
+    under_way: Option<Receiver<Made>>,
+}
+
+/// A picture that was made beside the loop.
+struct Made {
+    size: Size,
+    rgba: Vec<[u8; 4]>,
+    mark: u64,
+    scene_secs: f64,
+    ages: Ages,
+    /// What making it took.
+    secs: f64,
 }
 
 impl<S: Stage> Session<S> {
@@ -56,8 +81,18 @@ impl<S: Stage> Session<S> {
         let held = Shown::new(engine.canvas(), *engine.display());
         let (heat_maps, throughput) = (HeatMaps::default(), Throughput::default());
         let settings = Settings { own_sampler: None, ..settings };
-        let own_sampler = None;
-        Session { engine, settings, own_sampler, seed, held, heat_maps, throughput, mark: 0 }
+        Session {
+            engine,
+            settings,
+            own_sampler: None,
+            seed,
+            held,
+            heat_maps,
+            throughput,
+            mark: 0,
+            is_beside: false,
+            under_way: None,
+        }
     }
 
     /// Another sampler among those that the user may choose from; it begins.
@@ -74,6 +109,17 @@ impl<S: Stage> Session<S> {
         let threads = if threads == 0 { cores() } else { threads };
         self.engine.set_refresh_threads(threads.min(MOST_REFRESH_THREADS));
         self
+    }
+
+    /// Pictures are made beside the loop wherever they can be: samples show input meanwhile, for which a picture takes longer.
+    pub fn with_pictures_beside(mut self) -> Self {
+        self.is_beside = true;
+        self
+    }
+
+    /// See [`Stage::steering`].
+    pub fn steering(&self) -> Option<Steering> {
+        self.engine.tracer().tracer.steering()
     }
 
     /// One turn of the loop.
@@ -193,6 +239,64 @@ impl<S: Stage> Session<S> {
         self.engine.counters().kept >= enough || self.now() >= FIRST_PICTURE_AT_LATEST
     }
 
+    /// Begins to make the picture of now beside the loop, in reused memory, for [`Session::take_picture`].
+    ///
+    /// # Errors
+    /// Gives the memory back if that is not possible, or not wanted: then [`Session::picture`] makes it at once.
+    pub fn begin_picture(&mut self, memory: Vec<[u8; 4]>) -> Result<(), Vec<[u8; 4]>> {
+        let is_reprojected =
+            matches!(self.settings.reconstruction, ReconstructionKind::Reproject(_));
+        if !self.is_beside || !is_reprojected || self.is_making() {
+            return Err(memory);
+        }
+        let (begin, size, mark) = (self.engine.now(), self.engine.canvas().size(), self.mark);
+        let scene_secs = self.engine.timeline().scene_secs(begin);
+        let (sender, receiver) = channel();
+        let clock = self.engine.clock().clone();
+        // Given to the picture's thread, and back if there is none.
+        let shared = Arc::new(Mutex::new(memory));
+        let lent = Arc::clone(&shared);
+        let has_begun = self.engine.refresh_beside(begin, move |picture, canvas| {
+            let mut rgba = std::mem::take(&mut *lock(&lent));
+            rgba.clear();
+            rgba.extend(picture.iter().map(|&colour| rgba8(colour)));
+            let ages = shown::ages(canvas, begin);
+            let secs = clock.now().secs_since(begin);
+            // Nobody waits for it any more if the session is gone.
+            sender.send(Made { size, rgba, mark, scene_secs, ages, secs }).ok();
+        });
+        if !has_begun {
+            return Err(std::mem::take(&mut *lock(&shared)));
+        }
+        self.under_way = Some(receiver);
+        Ok(())
+    }
+
+    /// Whether a picture is being made beside the loop, or has been and is to be taken.
+    pub fn is_making(&self) -> bool {
+        self.under_way.is_some() || self.engine.is_refreshing()
+    }
+
+    /// The picture that was made beside the loop, when it is ready, and what making it took in seconds.
+    pub fn take_picture(&mut self) -> Option<(Picture, f64)> {
+        let made = self.under_way.as_ref()?.try_recv().ok()?;
+        self.under_way = None;
+        let Made { size, mut rgba, mark, scene_secs, ages, secs } = made;
+        let is_same_size = size == self.engine.canvas().size();
+        let overlay = is_same_size
+            .then(|| self.heat_maps.draw(self.settings.overlay, &mut self.engine, &mut rgba))
+            .flatten();
+        let throughput = self.throughput.update(self.engine.now(), self.engine.counters().kept);
+        let status = Status {
+            scene_secs,
+            samples_per_sec: throughput.samples_per_sec,
+            pictures_per_sec: throughput.pictures_per_sec,
+            ages,
+            overlay,
+        };
+        Some((Picture { size, rgba, mark, status }, secs))
+    }
+
     /// The picture now, in reused memory.
     pub fn picture(&mut self, memory: Vec<[u8; 4]>) -> Picture {
         let now = self.engine.now();
@@ -227,6 +331,10 @@ const MOST_REFRESH_THREADS: usize = 8;
 const PIXELS_PER_FIRST_SAMPLE: u64 = 64;
 // For renderers that need longer.
 const FIRST_PICTURE_AT_LATEST: Time = Time(500_000_000);
+
+fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// 8 bits per channel of a display-referred colour, with alpha 255.
 fn rgba8(colour: [f32; 3]) -> [u8; 4] {
@@ -323,6 +431,55 @@ mod tests {
         session.apply(Command::Speed(2.0));
         assert_eq!(brightness(&mut session), 255.0);
         assert_eq!(session.engine.tracer().tracer.view, ViewChoice::Camera(1));
+    }
+
+    /// A session with pictures beside the loop, one of which has been made at once.
+    fn session_beside(kind: ReconstructionKind) -> Session<Plain> {
+        let settings = Settings {
+            sampler: SamplerKind::Permutation,
+            reconstruction: kind,
+            tone_map: ToneMap::None,
+            ..Settings::default()
+        };
+        let (size, plain) = (Size::new(40, 30), Plain::new(1.0));
+        let session = Session::new(size, Clock::simulated(100_000.0), settings, 1, plain);
+        let mut session = session.with_pictures_beside();
+        run(&mut session, 0.1);
+        assert!(session.begin_picture(Vec::new()).is_err(), "the first picture of a size");
+        session.picture(Vec::new());
+        session
+    }
+
+    #[test]
+    fn a_picture_made_beside_the_loop_is_the_picture() {
+        let mut session = session_beside(ReconstructionKind::REPROJECT);
+        session.apply(Command::Mark(5));
+        session.begin_picture(vec![[7; 4]; 3]).unwrap();
+        assert!(session.is_making());
+        assert!(session.begin_picture(vec![[7; 4]]).is_err_and(|memory| memory == [[7; 4]]));
+        session.apply(Command::Mark(6));
+        let (picture, secs) = loop {
+            session.step().unwrap();
+            if let Some(made) = session.take_picture() {
+                break made;
+            }
+        };
+        assert_eq!((picture.size, picture.mark), (session.size(), 5), "marks after it began");
+        assert!(picture.rgba.iter().all(|&pixel| pixel == [255; 4]));
+        assert_eq!(picture.status.ages.unknown, 0);
+        assert!(secs >= 0.0);
+        while session.is_making() {
+            session.step().unwrap();
+        }
+        session.begin_picture(Vec::new()).unwrap();
+    }
+
+    #[test]
+    fn pictures_of_the_canvas_are_not_made_beside_the_loop() {
+        for kind in [ReconstructionKind::Hold, ReconstructionKind::Filter] {
+            let mut session = session_beside(kind);
+            assert!(session.begin_picture(Vec::new()).is_err(), "{kind:?}");
+        }
     }
 
     #[test]

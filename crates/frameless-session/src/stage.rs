@@ -5,7 +5,7 @@ use std::sync::Arc;
 use frameless_trace::{CpuTracer, ViewSource, World};
 
 use crate::command::ViewChoice;
-use crate::session::Stage;
+use crate::session::{Stage, Steering};
 
 impl Stage for CpuTracer {
     type World = Arc<World>;
@@ -15,6 +15,11 @@ impl Stage for CpuTracer {
             ViewChoice::Camera(camera) => ViewSource::Camera(camera),
             ViewChoice::Free(view) => ViewSource::Free(view),
         });
+    }
+
+    fn steering(&self) -> Option<Steering> {
+        let viewpoint = self.viewpoint();
+        Some(Box::new(move |view| viewpoint.set(ViewSource::Free(view))))
     }
 
     fn set_world(&mut self, world: Arc<World>) {

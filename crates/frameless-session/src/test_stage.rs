@@ -1,23 +1,28 @@
 //! A renderer for tests: one colour per world.
 
 use std::collections::VecDeque;
+use std::sync::{Arc, Mutex};
 
 use frameless::{Answer, Batch, Tracer};
+use frameless_scene::View;
 
 use crate::command::ViewChoice;
-use crate::session::Stage;
+use crate::session::{Stage, Steering};
 
 /// Every pixel is this grey, or every other column black; remembers where it is to look from.
 pub(crate) struct Plain {
     pub grey: f32,
     pub striped: bool,
     pub view: ViewChoice,
+    /// Where it was steered to last, past the loop.
+    pub steered: Arc<Mutex<Option<View>>>,
     answers: VecDeque<Answer>,
 }
 
 impl Plain {
     pub(crate) fn new(grey: f32) -> Plain {
-        Plain { grey, striped: false, view: ViewChoice::Camera(0), answers: VecDeque::new() }
+        let (view, steered) = (ViewChoice::Camera(0), Arc::default());
+        Plain { grey, striped: false, view, steered, answers: VecDeque::new() }
     }
 }
 
@@ -44,6 +49,11 @@ impl Stage for Plain {
 
     fn set_view(&mut self, view: ViewChoice) {
         self.view = view;
+    }
+
+    fn steering(&self) -> Option<Steering> {
+        let steered = Arc::clone(&self.steered);
+        Some(Box::new(move |view| *steered.lock().unwrap() = Some(view)))
     }
 
     fn set_world(&mut self, grey: f32) {

@@ -12,6 +12,7 @@ use obvhs::ploc::PlocBuilder;
 
 use crate::kernel::Pack;
 use crate::pages::prefer_large_pages;
+use crate::parts::{Of, PART, build_in_parts};
 use crate::traverse::STACK_PER_TREE;
 use crate::wide::{Child, Node, collapse};
 
@@ -32,20 +33,23 @@ impl Blas {
         let (primitives, boxes): (Vec<u32>, Vec<Aabb>) = (0..mesh.triangles.len() as u32)
             .filter_map(|primitive| Some((primitive, sane_box(&corners(primitive))?)))
             .unzip();
-        Blas::over(&primitives, &boxes, corners)
+        Blas::over(&primitives, boxes, corners)
     }
 
     /// Of these triangles, whose boxes are known; `corners` tells where each is.
     pub(crate) fn over(
         primitives: &[u32],
-        boxes: &[Aabb],
+        boxes: Vec<Aabb>,
         corners: impl Fn(u32) -> [Vec3; 3],
     ) -> Blas {
-        let mut binary = binary_by_clustering(boxes);
-        let mut blas = Blas { nodes: Vec::new(), packs: Vec::new(), bounds: union(boxes) };
-        let needed = blas.take(&binary, primitives, &corners);
-        if needed > STACK_PER_TREE {
-            binary = binary_by_median(boxes);
+        let mut blas = Blas { nodes: Vec::new(), packs: Vec::new(), bounds: union(&boxes) };
+        let mut binary = binary_by_clustering(&boxes);
+        // Not held beside the packs: they are the largest things in memory.
+        drop(boxes);
+        if blas.take(&binary, primitives, &corners) > STACK_PER_TREE {
+            let around = |&primitive| Aabb::from_points(&corners(primitive).map(Vec3A::from));
+            let boxes: Vec<Aabb> = primitives.iter().map(around).collect();
+            binary = binary_by_median(&boxes);
             blas.take(&binary, primitives, &corners);
         }
         blas.prefer_large_pages();
@@ -112,10 +116,21 @@ fn pack(primitives: &[u32], members: &[u32], corners: &impl Fn(u32) -> [Vec3; 3]
 /// Two packs.
 const MOST_PER_LEAF: u32 = 8;
 
+/// By clustering, of many boxes part by part.
+fn binary_by_clustering(boxes: &[Aabb]) -> Bvh2 {
+    if boxes.len() <= PART {
+        return cluster(boxes, MOST_PER_LEAF);
+    }
+    build_in_parts(boxes, |boxes, of| match of {
+        Of::Boxes => cluster(boxes, MOST_PER_LEAF),
+        Of::Parts => cluster(boxes, 1),
+    })
+}
+
 /// Parallel locally-ordered clustering with reinsertion; `obvhs`' medium preset, step by step, since its helper
 /// validates the whole tree in debug builds.
-fn binary_by_clustering(boxes: &[Aabb]) -> Bvh2 {
-    if boxes.len() <= 4 {
+pub(crate) fn cluster(boxes: &[Aabb], most_per_leaf: u32) -> Bvh2 {
+    if boxes.len() as u32 <= most_per_leaf.min(4) {
         return one_leaf(boxes);
     }
     let preset = BvhBuildParams::medium_build();
@@ -129,7 +144,7 @@ fn binary_by_clustering(boxes: &[Aabb]) -> Bvh2 {
     let mut optimizer = ReinsertionOptimizer::default();
     let ratio = preset.reinsertion_batch_ratio;
     optimizer.run(&mut binary, ratio, None);
-    leaf_collapser::collapse(&mut binary, MOST_PER_LEAF, preset.collapse_traversal_cost);
+    leaf_collapser::collapse(&mut binary, most_per_leaf, preset.collapse_traversal_cost);
     optimizer.run(
         &mut binary,
         ratio * preset.post_collapse_reinsertion_batch_ratio_multiplier,

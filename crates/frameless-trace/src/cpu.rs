@@ -1,25 +1,27 @@
 //! Batches traced on this machine's cores, beside the loop.
 
-use std::collections::VecDeque;
-use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-use frameless::{Answer, Batch, Lighting, Pose, Request, Size, Surface, Tracer};
+use frameless::{Answer, Batch, Lighting, Pose, Size, Surface, Tracer};
 use rayon::ThreadPool;
-use rayon::prelude::*;
 
 use crate::camera::{Camera, ViewSource};
+use crate::crew::{Crew, Work};
 use crate::integrator::Settings;
+use crate::latest::Latest;
 use crate::moment::Moment;
 use crate::order::by_tile;
 use crate::traverse::Stack;
 use crate::world::World;
 
-/// Samples that one thread takes at once. Fewer: more time spent on handing out work; more: threads idle at the end of a
-/// batch of a thousand.
-const CHUNK: usize = 64;
+/// Samples that one thread takes at once at most. Fewer: more time spent on handing out work, and less coherence; more: threads idle at
+/// the end of a batch of a thousand.
+const LONGEST_PIECE: usize = 64;
 
-/// A thread pool for [`crate::render`] or a [`CpuTracer`]; 0 threads: one per core.
+/// Of a thread's share of a batch, so that none is late by more than an eighth of it.
+const PIECES_PER_THREAD: usize = 8;
+
+/// A thread pool for [`crate::render`]; 0 threads: one per core.
 ///
 /// # Panics
 /// If the operating system gives no threads.
@@ -27,40 +29,51 @@ pub fn thread_pool(threads: usize) -> ThreadPool {
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .thread_name(|index| format!("trace-{index}"))
-        // The panic's message is out by now; the answer that never comes tells `collect`.
-        .panic_handler(|_| {})
         .build()
         .expect("threads for tracing can be started")
 }
 
 /// The renderer on this machine's cores: [`submit`](Tracer::submit) hands a batch to its threads and returns at once,
-/// [`collect`](Tracer::collect) gives the finished answers in the order in which they were submitted.
+/// [`collect`](Tracer::collect) gives the finished answers in the order in which they were submitted, and works, too, while it waits.
 ///
 /// An answer is the same, bit for bit, for any number of threads.
 pub struct CpuTracer {
-    shared: Arc<Shared>,
-    view: ViewSource,
-    settings: Settings,
-    pool: ThreadPool,
-    under_way: VecDeque<Receiver<Answer>>,
-}
-
-/// What a batch under way needs, so that the tracer can take up another world meanwhile.
-struct Shared {
     world: Arc<World>,
-    /// Memory of finished batches: one per batch that has ever been under way at the same time.
-    idle: Mutex<Vec<Workspace>>,
+    view: Arc<Mutex<ViewSource>>,
+    settings: Settings,
+    threads: usize,
+    crew: Crew<Task>,
+    idle: Idle,
+    is_real_time: bool,
+    /// Of a scene that takes long to bring to a time, in real time.
+    latest: Option<Arc<Latest>>,
 }
 
+/// Memory of finished batches: one per batch that has ever been under way at the same time.
+type Idle = Arc<Mutex<Vec<Workspace>>>;
+
+#[derive(Default)]
 struct Workspace {
-    moment: Moment,
+    /// Its own, but for a scene that has a [`Latest`]: that moment is let go when the batch is finished.
+    moment: Option<Arc<Moment>>,
     order: Vec<u32>,
-    /// In the order of `order`.
-    samples: Vec<([f32; 3], Surface)>,
+    /// Of each piece, in the order of `order`.
+    samples: Vec<Mutex<Vec<([f32; 3], Surface)>>>,
+}
+
+/// Where the camera is, for who moves it from another thread: what is not being traced yet is seen from there.
+#[derive(Clone)]
+pub struct Viewpoint(Arc<Mutex<ViewSource>>);
+
+impl Viewpoint {
+    /// Moves it.
+    pub fn set(&self, view: ViewSource) {
+        *lock(&self.0) = view;
+    }
 }
 
 impl CpuTracer {
-    /// `threads`: 0 for one per core.
+    /// `threads`: of those that work at the same time, that which waits for answers included; 0 for one per core.
     ///
     /// # Panics
     /// If the operating system gives no threads.
@@ -70,142 +83,233 @@ impl CpuTracer {
         settings: Settings,
         threads: usize,
     ) -> CpuTracer {
-        let (pool, under_way) = (thread_pool(threads), VecDeque::new());
-        CpuTracer { shared: Shared::new(world), view, settings, pool, under_way }
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        let threads = if threads == 0 { cores() } else { threads };
+        let (view, idle) = (Arc::new(Mutex::new(view)), Idle::default());
+        let crew = Crew::new(threads, "trace");
+        let (is_real_time, latest) = (false, None);
+        CpuTracer { world, view, settings, threads, crew, idle, is_real_time, latest }
     }
 
-    /// Batches submitted from now on are seen from here.
+    /// For the real clock: a scene that takes long to bring to a time, as one with a large mesh that deforms, does not hold up its batches. They show
+    /// the newest moment that is finished, and the next is made meanwhile.
+    pub fn in_real_time(mut self) -> CpuTracer {
+        self.is_real_time = true;
+        self.begin_world();
+        self
+    }
+
+    fn begin_world(&mut self) {
+        let is_late = self.is_real_time && self.world.takes_long_to_move();
+        self.latest = is_late.then(|| Arc::new(Latest::new(Arc::clone(&self.world))));
+    }
+
+    /// Batches that are not being traced yet are seen from here.
     pub fn set_view(&mut self, view: ViewSource) {
-        self.view = view;
+        *lock(&self.view) = view;
+    }
+
+    /// The same for other threads.
+    pub fn viewpoint(&self) -> Viewpoint {
+        Viewpoint(Arc::clone(&self.view))
     }
 
     /// What is being traced.
     pub fn world(&self) -> &Arc<World> {
-        &self.shared.world
+        &self.world
     }
 
     /// Batches submitted from now on show this world.
     pub fn set_world(&mut self, world: Arc<World>) {
-        self.shared = Shared::new(world);
+        self.world = world;
+        self.idle = Idle::default();
+        self.begin_world();
+    }
+
+    fn at<T>(&self, scene_secs: f64, tell: impl FnOnce(&World, &Moment) -> T) -> T {
+        let latest = self.latest.as_deref();
+        let workspace = take_workspace(&self.idle, &self.world, scene_secs, latest);
+        let told = tell(&self.world, workspace.moment());
+        leave_workspace(&self.idle, workspace, latest);
+        told
     }
 }
 
 impl Tracer for CpuTracer {
     fn submit(&mut self, batch: Batch) {
-        let (answer, receiver) = sync_channel(1);
-        let (shared, view, settings) = (self.shared.clone(), self.view, self.settings);
-        self.under_way.push_back(receiver);
-        self.pool.spawn(move || {
-            // Nobody listens any more once the tracer is dropped.
-            let _ = answer.send(shared.answer(batch, &view, &settings));
+        let pieces = PIECES_PER_THREAD * self.threads;
+        let piece = (batch.requests.len() / pieces).clamp(1, LONGEST_PIECE);
+        self.crew.submit(Task {
+            world: Arc::clone(&self.world),
+            view: Arc::clone(&self.view),
+            settings: self.settings,
+            idle: Arc::clone(&self.idle),
+            latest: self.latest.clone(),
+            piece,
+            // Batches are as long as they may last: one of few samples has slow ones.
+            is_short: batch.requests.len() >= pieces,
+            batch,
+            ready: OnceLock::new(),
+            camera: OnceLock::new(),
         });
     }
 
     /// # Panics
-    /// If a thread of the pool has panicked.
+    /// If a thread of the tracer's has panicked.
     fn collect(&mut self, wait: bool) -> Option<Answer> {
-        const LOST: &str = "a tracing thread panicked";
-        let first = self.under_way.front()?;
-        let answer = if wait {
-            first.recv().expect(LOST)
-        } else {
-            match first.try_recv() {
-                Ok(answer) => answer,
-                Err(TryRecvError::Empty) => return None,
-                Err(TryRecvError::Disconnected) => panic!("{LOST}"),
-            }
-        };
-        self.under_way.pop_front();
-        Some(answer)
+        if wait { self.crew.wait() } else { self.crew.poll() }
     }
 
     fn is_noisy(&self) -> bool {
         self.settings.integrator.is_noisy()
     }
 
+    fn samples_at_once(&self) -> usize {
+        self.threads
+    }
+
+    fn spare_threads(&mut self, threads: usize) {
+        self.crew.spare(threads);
+    }
+
     fn pose(&mut self, scene_secs: f64, size: Size, pose: &mut Pose) -> bool {
-        let mut workspace = self.shared.take_workspace(scene_secs);
-        self.shared.world.update_moment(scene_secs, &mut workspace.moment);
-        let view = self.view.at(self.shared.world.scene(), workspace.moment.state());
-        self.shared.world.pose(&workspace.moment, &view, size, pose);
-        self.shared.idle().push(workspace);
+        let view = *lock(&self.view);
+        self.at(scene_secs, |world, moment| {
+            world.pose(moment, &view.at(world.scene(), moment.state()), size, pose);
+        });
         true
     }
 
     fn lighting(&mut self, scene_secs: f64, lighting: &mut Lighting) -> bool {
-        let mut workspace = self.shared.take_workspace(scene_secs);
-        self.shared.world.update_moment(scene_secs, &mut workspace.moment);
-        self.shared.world.lighting(&workspace.moment, lighting);
-        self.shared.idle().push(workspace);
+        self.at(scene_secs, |world, moment| world.lighting(moment, lighting));
         true
     }
 }
 
-impl Shared {
-    fn new(world: Arc<World>) -> Arc<Shared> {
-        Arc::new(Shared { world, idle: Mutex::new(Vec::new()) })
+/// A batch under way, with all that it needs, so that the tracer can take up another world meanwhile.
+struct Task {
+    world: Arc<World>,
+    view: Arc<Mutex<ViewSource>>,
+    settings: Settings,
+    idle: Idle,
+    latest: Option<Arc<Latest>>,
+    /// Samples per piece.
+    piece: usize,
+    is_short: bool,
+    batch: Batch,
+    ready: OnceLock<Workspace>,
+    /// That of the moment when tracing began.
+    camera: OnceLock<Camera>,
+}
+
+impl Task {
+    fn workspace(&self) -> &Workspace {
+        self.ready.get().expect("prepared before it is traced")
     }
 
-    /// Runs in the pool, and hands parts of the batch to the pool's other threads.
-    fn answer(&self, batch: Batch, view: &ViewSource, settings: &Settings) -> Answer {
-        let mut workspace = self.take_workspace(batch.scene_secs);
-        self.world.update_moment(batch.scene_secs, &mut workspace.moment);
-        let view = view.at(self.world.scene(), workspace.moment.state());
-        by_tile(&batch.requests, batch.size, &mut workspace.order);
-        self.trace(&mut workspace, &Camera::new(&view, batch.size), &batch.requests, settings);
-        let (rgb, surfaces) = workspace.in_order_of_requests(settings);
-        self.idle().push(workspace);
-        Answer::to(batch, rgb, surfaces)
-    }
-
-    fn trace(
-        &self,
-        workspace: &mut Workspace,
-        camera: &Camera,
-        requests: &[Request],
-        settings: &Settings,
-    ) {
-        let Workspace { moment, order, samples } = workspace;
-        samples.resize(order.len(), ([0.0; 3], Surface::default()));
-        let chunks = order.par_chunks(CHUNK).zip(samples.par_chunks_mut(CHUNK));
-        chunks.for_each_init(Stack::new, |stack, (order, samples)| {
-            let (seen, mut places) = ((&*moment, camera), samples.iter_mut());
-            let requests = order.iter().map(|&request| requests[request as usize]);
-            let put = |rgb, surface| {
-                if let Some(place) = places.next() {
-                    *place = (rgb, surface);
-                }
-            };
-            self.world.samples(seen, requests, settings, stack, put);
-        });
-    }
-
-    fn take_workspace(&self, secs: f64) -> Workspace {
-        self.idle().pop().unwrap_or_else(|| Workspace {
-            moment: self.world.moment(secs),
-            order: Vec::new(),
-            samples: Vec::new(),
+    fn camera(&self) -> &Camera {
+        self.camera.get_or_init(|| {
+            let view = *lock(&self.view);
+            let state = self.workspace().moment().state();
+            Camera::new(&view.at(self.world.scene(), state), self.batch.size)
         })
     }
+}
 
-    fn idle(&self) -> std::sync::MutexGuard<'_, Vec<Workspace>> {
-        self.idle.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+impl Work for Task {
+    type Answer = Answer;
+
+    fn is_short(&self) -> bool {
+        self.is_short
+    }
+
+    fn pieces(&self) -> usize {
+        self.batch.requests.len().div_ceil(self.piece).max(1)
+    }
+
+    fn prepare(&self) {
+        let Batch { scene_secs, requests, size, .. } = &self.batch;
+        let latest = self.latest.as_deref();
+        let mut workspace = take_workspace(&self.idle, &self.world, *scene_secs, latest);
+        by_tile(requests, *size, &mut workspace.order);
+        if workspace.samples.len() < self.pieces() {
+            workspace.samples.resize_with(self.pieces(), Mutex::default);
+        }
+        assert!(self.ready.set(workspace).is_ok(), "prepared once");
+    }
+
+    fn piece(&self, number: usize, stack: &mut Stack) {
+        let workspace = self.workspace();
+        let (moment, order, samples) = (workspace.moment(), &workspace.order, &workspace.samples);
+        let camera = self.camera();
+        let mut samples = lock(&samples[number]);
+        samples.clear();
+        let requests = order.chunks(self.piece).nth(number).unwrap_or_default();
+        let requests = requests.iter().map(|&request| self.batch.requests[request as usize]);
+        let put = |rgb, surface| samples.push((rgb, surface));
+        self.world.samples((moment, camera), requests, &self.settings, stack, put);
+    }
+
+    fn finish(self) -> Answer {
+        let Task { settings, idle, latest, piece, batch, ready, .. } = self;
+        let mut workspace = ready.into_inner().expect("prepared before it is traced");
+        let (rgb, surfaces) = workspace.in_order_of_requests(piece, &settings);
+        leave_workspace(&idle, workspace, latest.as_deref());
+        Answer::to(batch, rgb, surfaces)
     }
 }
 
 impl Workspace {
-    fn in_order_of_requests(&self, settings: &Settings) -> (Vec<[f32; 3]>, Vec<Surface>) {
-        let mut rgb = vec![[0.0; 3]; self.samples.len()];
+    fn moment(&self) -> &Moment {
+        self.moment.as_ref().expect("a workspace that was taken has one")
+    }
+
+    fn in_order_of_requests(
+        &mut self,
+        piece: usize,
+        settings: &Settings,
+    ) -> (Vec<[f32; 3]>, Vec<Surface>) {
+        let mut rgb = vec![[0.0; 3]; self.order.len()];
         let mut surfaces = Vec::new();
         if settings.surfaces {
-            surfaces.resize(self.samples.len(), Surface::default());
+            surfaces.resize(self.order.len(), Surface::default());
         }
-        for (&request, &(colour, surface)) in self.order.iter().zip(&self.samples) {
-            rgb[request as usize] = colour;
-            if settings.surfaces {
-                surfaces[request as usize] = surface;
+        for (requests, samples) in self.order.chunks(piece).zip(&mut self.samples) {
+            let samples = samples.get_mut().unwrap_or_else(PoisonError::into_inner);
+            for (&request, &(colour, surface)) in requests.iter().zip(&*samples) {
+                rgb[request as usize] = colour;
+                if settings.surfaces {
+                    surfaces[request as usize] = surface;
+                }
             }
         }
         (rgb, surfaces)
     }
+}
+
+/// At this time, or with the newest moment that there is.
+fn take_workspace(idle: &Idle, world: &World, secs: f64, latest: Option<&Latest>) -> Workspace {
+    let mut workspace = lock(idle).pop().unwrap_or_default();
+    workspace.moment = Some(match (latest, workspace.moment.take()) {
+        (Some(latest), _) => latest.at(secs),
+        (None, Some(mut own)) => {
+            let moment = Arc::get_mut(&mut own).expect("nobody else has a workspace's own moment");
+            world.update_moment(secs, moment);
+            own
+        }
+        (None, None) => Arc::new(world.moment(secs)),
+    });
+    workspace
+}
+
+/// Gives it back to be used again.
+fn leave_workspace(idle: &Idle, mut workspace: Workspace, latest: Option<&Latest>) {
+    if latest.is_some() {
+        workspace.moment = None;
+    }
+    lock(idle).push(workspace);
+}
+
+fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
 }

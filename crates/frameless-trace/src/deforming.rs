@@ -40,6 +40,11 @@ impl Deforming {
         changed
     }
 
+    /// How many there are.
+    pub(crate) fn triangles(&self) -> usize {
+        self.triangles.len()
+    }
+
     pub(crate) fn now(&self) -> &Deformed {
         &self.now
     }

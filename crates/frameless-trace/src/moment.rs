@@ -4,6 +4,7 @@ use frameless::{Light, Lighting, Placement, Pose, Size};
 use frameless_scene::{Geometry, State, View};
 
 use glam::Affine3A;
+use rayon::prelude::*;
 
 use crate::camera::Camera;
 use crate::deforming::Deforming;
@@ -54,6 +55,9 @@ impl Moment {
         Targets { top: &self.top, placed: &self.placed, trees, standing, isa: world.isa }
     }
 }
+
+/// Of all that deforms; below, handing it out takes longer than doing it.
+const MANY_TRIANGLES: usize = 10_000;
 
 fn placement(world_from_object: &Affine3A) -> Placement {
     let Affine3A { matrix3: m, translation } = world_from_object;
@@ -112,9 +116,17 @@ impl World {
             moment.deforming.clone_from(&self.deforming);
         }
         let mut moved = self.place_instances(moment);
-        for (index, deforming) in moment.deforming.iter_mut().enumerate() {
-            moved |= deforming.update(self.scene(), index, &moment.state);
-        }
+        let state = &moment.state;
+        let update = |(index, one): (usize, &mut Deforming)| one.update(self.scene(), index, state);
+        let triangles: usize = moment.deforming.iter().map(Deforming::triangles).sum();
+        moved |= match moment.deforming.len() > 1 && triangles > MANY_TRIANGLES {
+            true => {
+                let all = moment.deforming.par_iter_mut().enumerate();
+                all.map(update).reduce(|| false, |a, b| a | b)
+            }
+            // Not `any`: all of them are to be updated.
+            false => moment.deforming.iter_mut().enumerate().map(update).fold(false, |a, b| a | b),
+        };
         if moved || !same_world {
             let standing = self.standing.as_ref().filter(|all| all.holds(&moment.placed));
             moment.standing_holds = standing.is_some();

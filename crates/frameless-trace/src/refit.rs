@@ -41,7 +41,7 @@ impl Flexible {
         let primitives: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
         let boxes = primitives.iter().map(|&primitive| Aabb::from_points(&corners(primitive)));
         let boxes: Vec<Aabb> = boxes.collect();
-        let blas = Blas::over(&primitives, &boxes, |primitive| corners(primitive).map(Vec3::from));
+        let blas = Blas::over(&primitives, boxes, |primitive| corners(primitive).map(Vec3::from));
         let vertices = blas.packs.iter().map(|pack| {
             let lanes = pack.primitive.map(|primitive| mesh.triangles[primitive as usize]);
             std::array::from_fn(|corner| lanes.map(|triangle| triangle[corner]))

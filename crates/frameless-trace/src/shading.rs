@@ -344,20 +344,20 @@ fn any_number_of_threads_gives_the_same_answers_in_order() {
     }
 }
 
-#[test]
-fn the_view_is_that_of_the_submission() {
+/// A tracer of a sky that is white above and black below, seen from inside, and a batch of one pixel of it.
+fn sky_tracer() -> (CpuTracer, impl Fn(u64) -> Batch, impl Fn(Vec3) -> ViewSource) {
     let mut scene = scenes::empty();
     scene.sky = [Vec3::ZERO, Vec3::ONE];
     let world = Arc::new(World::new(Arc::new(scene)));
     let projection = Projection::Perspective { yfov_rad: 0.1 };
-    let towards = |target| {
+    let towards = move |target| {
         ViewSource::Free(View {
             world_from_camera: look_at(Vec3::ZERO, target, Vec3::Z),
             projection,
         })
     };
     let settings = Settings { surfaces: false, ..Settings::default() };
-    let mut tracer = CpuTracer::new(world, towards(Vec3::Y), settings, 1);
+    let tracer = CpuTracer::new(world, towards(Vec3::Y), settings, 1);
     let batch = |id| Batch {
         id,
         now: Time::ZERO,
@@ -365,11 +365,24 @@ fn the_view_is_that_of_the_submission() {
         size: Size::new(1, 1),
         requests: vec![Request::centre(0)],
     };
+    (tracer, batch, towards)
+}
+
+#[test]
+fn a_batch_is_seen_from_where_the_camera_is_when_its_tracing_begins() {
+    let (mut tracer, batch, towards) = sky_tracer();
     tracer.submit(batch(0));
+    let first = tracer.collect(true).unwrap();
+    // Nobody traces before somebody waits.
+    (1..3).for_each(|id| tracer.submit(batch(id)));
     tracer.set_view(towards(Vec3::NEG_Y));
-    tracer.submit(batch(1));
-    let (first, second) = (tracer.collect(true).unwrap(), tracer.collect(true).unwrap());
-    assert_eq!((first.rgb[0], second.rgb[0]), ([1.0; 3], [0.0; 3]));
+    let second = tracer.collect(true).unwrap();
+    tracer.viewpoint().set(towards(Vec3::Y));
+    tracer.submit(batch(3));
+    // The third may have been traced while the second was waited for.
+    let _third = tracer.collect(true).unwrap();
+    let last = tracer.collect(true).unwrap();
+    assert_eq!([first.rgb[0], second.rgb[0], last.rgb[0]], [[1.0; 3], [0.0; 3], [1.0; 3]]);
     assert!(first.surfaces.is_empty());
     assert_eq!(tracer.collect(true), None);
 }

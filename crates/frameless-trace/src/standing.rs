@@ -67,7 +67,7 @@ impl Standing {
                 .map_or([Vec3::ZERO; 3], |(place, mesh)| corners_at(place, mesh, primitive))
         };
         let all: Vec<u32> = (0..members.len() as u32).collect();
-        let tree = Blas::over(&all, &boxes, corners);
+        let tree = Blas::over(&all, boxes, corners);
         prefer_large_pages(&members);
         Some(Standing { tree, members, places })
     }
@@ -143,7 +143,7 @@ fn places(scene: &Scene) -> Vec<Option<Affine3A>> {
 }
 
 /// Per node: whether the animation moves it or what it hangs on.
-fn moving_nodes(scene: &Scene) -> Vec<bool> {
+pub(crate) fn moving_nodes(scene: &Scene) -> Vec<bool> {
     let mut moves = vec![false; scene.nodes.len()];
     for channel in &scene.animation.channels {
         match channel.target {

@@ -15,7 +15,7 @@ use crate::holes::may_have_holes;
 use crate::images::Mirrors;
 use crate::kernel::Isa;
 use crate::matter::is_plain;
-use crate::standing::Standing;
+use crate::standing::{Standing, moving_nodes};
 use crate::surroundings::Surroundings;
 use crate::texture::Copies;
 
@@ -123,6 +123,21 @@ impl World {
                 self.blas[geometry].get_or_init(|| Blas::new(mesh, place));
             }
         }
+    }
+
+    /// Whether bringing it to another time takes more than a fifth of a batch: about 100 µs.
+    pub(crate) fn takes_long_to_move(&self) -> bool {
+        /// Deforming triangles; 20 ns each, vertices included.
+        const MANY: usize = 5_000;
+        /// An instance that moves takes its part in the tree over all of them: 100 ns.
+        const PER_INSTANCE: usize = 5;
+        if self.scene.animation.channels.is_empty() {
+            return false;
+        }
+        let deforming: usize = self.deforming.iter().map(Deforming::triangles).sum();
+        let moves = moving_nodes(&self.scene);
+        let moving = self.scene.instances.iter().filter(|one| moves[one.node as usize]).count();
+        deforming + PER_INSTANCE * moving > MANY
     }
 
     /// What was prepared.

@@ -70,7 +70,8 @@ impl App {
             ViewSource::Camera(0),
             options.tracing,
             options.threads,
-        );
+        )
+        .in_real_time();
         let size = settings.picture.size_in(options.window.map(|side| side as u32));
         let session = Session::new(size, Clock::real(), settings, options.seed, tracer)
             .with_refresh_threads(options.threads);

@@ -212,6 +212,29 @@ impl Canvas {
         (self.time_of(pixel), self.rgb[i])
     }
 
+    /// Becomes a copy of a canvas as far as a reconstruction changes what is there; it replaces all else but the colours.
+    pub(crate) fn copy_times(&mut self, other: &Canvas) {
+        self.traced.clone_from(&other.traced);
+        (self.size, self.generation) = (other.size, other.generation);
+        (self.shown_at, self.updates) = (other.shown_at, other.updates);
+    }
+
+    /// Takes over what a copy has been told since; its memory is handed back.
+    pub(crate) fn take_all_but_colours(&mut self, copy: &mut Canvas) {
+        assert_eq!(
+            (copy.size, copy.generation),
+            (self.size, self.generation),
+            "a copy of this one"
+        );
+        std::mem::swap(self, copy);
+        std::mem::swap(&mut self.rgb, &mut copy.rgb);
+    }
+
+    /// A sample of this time has been written to the canvas that this is a copy of.
+    pub(crate) fn note(&mut self, pixel: u32, time: Time) {
+        self.traced.set(self.traced.place(pixel), time);
+    }
+
     /// Write a sample; returns the time and colour that it replaces.
     #[inline]
     pub(crate) fn replace(&mut self, pixel: u32, time: Time, rgb: [f32; 3]) -> (Time, [f32; 3]) {

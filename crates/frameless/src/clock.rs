@@ -9,6 +9,10 @@ use crate::{BatchLength, Time};
 /// and 120, so that on the simulated clock no batch straddles a display refresh.
 pub const BATCHES_PER_SEC: u32 = 960;
 
+/// On the real clock batches are half as long: input waits for the one that is being traced, and for the first that shows it. Shorter
+/// ones cost more for themselves than they save (docs/performance.md).
+const REAL_BATCHES_PER_SEC: f64 = 2.0 * BATCHES_PER_SEC as f64;
+
 /// Where "now" comes from.
 #[derive(Clone, Debug)]
 pub enum Clock {
@@ -87,7 +91,7 @@ impl Clock {
     /// Real clock: do nothing for about half a batch; called when nothing is due.
     pub(crate) fn rest(&self) {
         if let Clock::Real(_) = self {
-            std::thread::sleep(Duration::from_secs_f64(0.5 / f64::from(BATCHES_PER_SEC)));
+            std::thread::sleep(Duration::from_secs_f64(0.5 / REAL_BATCHES_PER_SEC));
         }
     }
 }
@@ -123,7 +127,7 @@ pub struct Real {
     budget_per_sec: Option<f64>,
     allowance: f64,
     allowance_at: Time,
-    samples_per_sec: f64,
+    secs_per_sample: f64,
     last_answer: Option<Time>,
     /// For a renderer whose calls have a price.
     length: Option<BatchLength>,
@@ -133,7 +137,8 @@ pub struct Real {
 const FIRST_BATCH: usize = 2;
 // More would not fit a batch's memory into the cache; 65,536 samples in 1 ms are 15 ns each.
 const LARGEST_BATCH: f64 = 65_536.0;
-// Weight of the newest batch in the learned rate: settles within about ten batches (10 ms).
+// Weight of the newest batch in the learned time per sample: settles within about ten batches (5 ms) where samples become cheaper. Where
+// they become dearer the next batch is shorter at once, since times are averaged and not rates.
 const LEARNING_RATE: f64 = 0.2;
 
 impl Real {
@@ -143,7 +148,7 @@ impl Real {
             budget_per_sec: None,
             allowance: 0.0,
             allowance_at: Time::ZERO,
-            samples_per_sec: FIRST_BATCH as f64 * f64::from(BATCHES_PER_SEC),
+            secs_per_sample: 1.0 / (FIRST_BATCH as f64 * REAL_BATCHES_PER_SEC),
             last_answer: None,
             length: None,
         }
@@ -173,7 +178,7 @@ impl Real {
         // What was not used in time is lost, but for one batch: a renderer that stood still does not catch up in a burst, and one
         // whose calls take long is not starved.
         let earned = budget * now.secs_since(self.allowance_at);
-        let most = (2.0 * budget / f64::from(BATCHES_PER_SEC)).max(wanted as f64).max(1.0);
+        let most = (2.0 * budget / REAL_BATCHES_PER_SEC).max(wanted as f64).max(1.0);
         self.allowance = (self.allowance + earned).min(most);
         self.allowance_at = now;
         let count = wanted.min(self.allowance as usize);
@@ -184,24 +189,29 @@ impl Real {
     /// Told after an answer of `samples` samples has been kept; `busy`: another batch was under way, so that the
     /// renderer has worked all the time since the answer before.
     pub(crate) fn answered(&mut self, samples: usize, busy: bool) {
-        let now = self.now();
+        self.answered_at(self.now(), samples, busy);
+    }
+
+    fn answered_at(&mut self, now: Time, samples: usize, busy: bool) {
         if let (Some(last), true) = (self.last_answer, samples > 0) {
-            let measured = samples as f64 / now.secs_since(last).max(1e-6);
-            // Grow by at most a factor of two per batch: one lucky measurement must not make a batch of 60 ms.
-            let measured = measured.min(2.0 * self.samples_per_sec);
-            self.samples_per_sec += LEARNING_RATE * (measured - self.samples_per_sec);
+            let measured = now.secs_since(last).max(1e-6) / samples as f64;
+            // A batch grows by at most a sixth: one lucky measurement must not make a batch of 60 ms. And shrinks to two fifths at most: whatever
+            // else the machine does may hold up a batch.
+            let measured = measured.clamp(0.25 * self.secs_per_sample, 8.0 * self.secs_per_sample);
+            self.secs_per_sample += LEARNING_RATE * (measured - self.secs_per_sample);
         }
         self.last_answer = busy.then_some(now);
     }
 
     /// How many samples the renderer traces in so many seconds.
     pub(crate) fn samples_in(&self, secs: f64) -> usize {
-        (self.samples_per_sec * secs) as usize
+        (secs / self.secs_per_sample) as usize
     }
 
     /// Samples in a batch that lasts as long as it should.
     pub(crate) fn batch_length(&self) -> usize {
-        (self.samples_per_sec / f64::from(BATCHES_PER_SEC)).clamp(1.0, LARGEST_BATCH) as usize
+        let samples = 1.0 / (REAL_BATCHES_PER_SEC * self.secs_per_sample);
+        samples.clamp(1.0, LARGEST_BATCH) as usize
     }
 }
 
@@ -222,7 +232,7 @@ mod tests {
     #[test]
     fn a_budget_is_kept() {
         let Clock::Real(mut clock) = Clock::real() else { unreachable!() };
-        clock.samples_per_sec = 1e9;
+        clock.secs_per_sample = 1e-9;
         clock.set_budget(Some(100_000.0));
         let mut total = 0;
         let until = clock.now().0 + 100_000_000;
@@ -232,5 +242,58 @@ mod tests {
             std::thread::sleep(Duration::from_micros(500));
         }
         assert!(total <= 10_200, "100 ms at 100,000 samples/s: {total}");
+    }
+
+    /// The lengths and durations of batches of a renderer that traces so many samples at once, each in so many seconds, with two batches
+    /// under way.
+    fn batches(clock: &mut Real, secs_per_sample: f64, at_once: usize) -> Vec<(usize, f64)> {
+        let mut now = clock.last_answer.unwrap_or(Time(1)).secs();
+        let mut waiting = std::collections::VecDeque::new();
+        let mut batches = Vec::new();
+        for _ in 0..150 {
+            while waiting.len() < 2 {
+                waiting.push_back(clock.batch_length().max(at_once));
+            }
+            let samples: usize = waiting.pop_front().expect("two");
+            let secs = samples.div_ceil(at_once) as f64 * secs_per_sample;
+            now += secs;
+            clock.answered_at(Time::from_secs(now), samples, true);
+            batches.push((samples, secs));
+        }
+        batches
+    }
+
+    #[test]
+    fn a_batch_lasts_at_most_a_millisecond_at_any_speed_of_the_renderer() {
+        for at_once in [1, 2, 16] {
+            // 0.1 µs to 1 s.
+            for secs_per_sample in (0..8).map(|decade| 1e-7 * 10f64.powi(decade)) {
+                let Clock::Real(mut clock) = Clock::real() else { unreachable!() };
+                let batches = batches(&mut clock, secs_per_sample, at_once);
+                let per_batch = at_once as f64 * 0.5e-3 / secs_per_sample;
+                for (i, &(samples, secs)) in batches.iter().enumerate() {
+                    let context = format!("{secs_per_sample} s, {at_once} at once, batch {i}");
+                    assert!(
+                        secs < 1.001e-3 || samples <= at_once.max(FIRST_BATCH),
+                        "{context}: {samples}, {secs} s"
+                    );
+                    if i >= 100 {
+                        let is_one_per_core = per_batch < at_once as f64 && samples == at_once;
+                        let is_full = samples as f64 > 0.8 * per_batch.min(LARGEST_BATCH);
+                        assert!(is_one_per_core || is_full, "{context}: {samples}, {per_batch}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_renderer_that_becomes_slower_gets_short_batches_at_once() {
+        let Clock::Real(mut clock) = Clock::real() else { unreachable!() };
+        batches(&mut clock, 1e-6, 2);
+        // As a view into glass, or a path instead of a straight ray.
+        let slow = batches(&mut clock, 1e-4, 2);
+        let long: f64 = slow.iter().map(|batch| batch.1).filter(|&secs| secs > 1.1e-3).sum();
+        assert!(long < 3.0 * slow[0].1, "{slow:?}");
     }
 }

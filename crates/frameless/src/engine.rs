@@ -1,12 +1,15 @@
 //! THE LOOP: choose pixels → trace them now → keep the samples → observe what changed.
 
+use std::collections::VecDeque;
+
 use thiserror::Error;
 
 use crate::add_up::AddUp;
+use crate::beside::{Beside, Late, Order, Told, Work};
+use crate::replaced::{Before, Replaced};
 use crate::{
     Answer, Batch, Canvas, Clock, Display, Findings, Hold, Kept, Lighting, Observation, Pose,
-    Rates, Reconstruction, Refresh, Request, Sampler, Size, Surface, Time, Timeline, Tracer,
-    Weights,
+    Rates, Reconstruction, Refresh, Request, Sampler, Size, Time, Timeline, Tracer, Weights,
 };
 
 /// Everything that runs a frameless picture: a clock, a sampler, a renderer, and the canvas between them.
@@ -18,6 +21,8 @@ pub struct Engine<T> {
     sampler: Box<dyn Sampler>,
     add_up: AddUp,
     reconstruction: Box<dyn Reconstruction>,
+    // Whether it has made no picture of this canvas yet.
+    is_first_picture: bool,
     tracer: T,
     // Samples submitted and not yet answered.
     outstanding: usize,
@@ -33,17 +38,13 @@ pub struct Engine<T> {
     lighting: Lighting,
     picture: Vec<[f32; 3]>,
     refresh_threads: usize,
-}
-
-/// The samples of one answer and what they took the place of, in the answer's order.
-#[derive(Default)]
-struct Replaced {
-    requests: Vec<Request>,
-    /// When the pixel had been traced before, and whether anything was known of it.
-    before: Vec<(Time, bool)>,
-    old: Vec<[f32; 3]>,
-    new: Vec<[f32; 3]>,
-    surfaces: Vec<Surface>,
+    // A picture under way has the reconstruction, and then the canvas with it.
+    beside: Option<Beside>,
+    beside_canvas: Option<Canvas>,
+    // What samples told that came meanwhile, of which the sampler has not heard yet.
+    unheard: VecDeque<Told>,
+    late: Late,
+    spare_replaced: Vec<Replaced>,
 }
 
 /// What the loop has done so far.
@@ -105,15 +106,11 @@ const AHEAD: usize = 16;
 /// Batches under way at once on the real clock: while one is traced the next is chosen.
 const PIPELINE_DEPTH: usize = 2;
 
-impl Replaced {
-    fn clear(&mut self) {
-        self.requests.clear();
-        self.before.clear();
-        self.old.clear();
-        self.new.clear();
-        self.surfaces.clear();
-    }
-}
+/// After a picture that was made beside the loop: of so many answers that came meanwhile the sampler hears, and so many are told to the
+/// reconstruction, per answer that comes, until none waits. More at once would hold up the loop, fewer would not be through before the next
+/// picture.
+const UNHEARD_PER_ANSWER: usize = 8;
+const LATE_PER_ANSWER: usize = 3;
 
 impl<T: Tracer> Engine<T> {
     /// A loop over a black canvas.
@@ -136,6 +133,7 @@ impl<T: Tracer> Engine<T> {
             sampler,
             add_up: AddUp::default(),
             reconstruction: Box::new(Hold::default()),
+            is_first_picture: true,
             tracer,
             outstanding: 0,
             counters: Counters::default(),
@@ -148,6 +146,11 @@ impl<T: Tracer> Engine<T> {
             lighting: Lighting::default(),
             picture: Vec::new(),
             refresh_threads: 1,
+            beside: None,
+            beside_canvas: None,
+            unheard: VecDeque::new(),
+            late: Late::new(),
+            spare_replaced: Vec::new(),
         }
     }
 
@@ -161,6 +164,7 @@ impl<T: Tracer> Engine<T> {
     /// go on.
     pub fn step(&mut self) -> Result<usize, EngineError> {
         self.observations.clear();
+        self.take_back_if_done();
         match &mut self.clock {
             Clock::Simulated(clock) => {
                 let (now, count) = clock.next_batch();
@@ -195,7 +199,8 @@ impl<T: Tracer> Engine<T> {
         }
         let kept = self.collect_one()?.unwrap_or(0);
         // What was worked ahead has come while nobody waited for it.
-        let is_waited_for = self.outstanding <= PIPELINE_DEPTH * self.clock.batch_length();
+        let batch = self.clock.batch_length().max(self.tracer.samples_at_once());
+        let is_waited_for = self.outstanding <= PIPELINE_DEPTH * batch;
         self.clock.answered(kept, self.outstanding > 0 && is_waited_for);
         Ok(kept)
     }
@@ -214,7 +219,7 @@ impl<T: Tracer> Engine<T> {
     /// Real clock: chooses batches until the renderer has enough to do for so many seconds, and for the choosing of the next.
     fn keep_busy(&mut self, secs: f64) {
         while let Clock::Real(clock) = &mut self.clock {
-            let batch = clock.batch_length();
+            let batch = clock.batch_length().max(self.tracer.samples_at_once());
             if self.outstanding >= clock.samples_in(secs) + PIPELINE_DEPTH * batch {
                 return;
             }
@@ -260,7 +265,9 @@ impl<T: Tracer> Engine<T> {
         if !self.sampler.refines() {
             self.add_up.turn(&self.canvas, &mut requests);
         }
-        self.reconstruction.aim(now, &self.canvas, &mut requests);
+        if self.beside.is_none() {
+            self.reconstruction.aim(now, &self.canvas, &mut requests);
+        }
         let (id, scene_secs) = (self.counters.batches, self.timeline.scene_secs(now));
         self.counters.batches += u64::from(!requests.is_empty());
         Batch { id, now, scene_secs, size: self.canvas.size(), requests }
@@ -291,7 +298,9 @@ impl<T: Tracer> Engine<T> {
             return Ok(0);
         }
         let outcome = self.keep(&answer);
-        let kept = self.observe(answer.now);
+        let kept = self.replaced.requests.len();
+        self.counters.kept += kept as u64;
+        self.tell(answer.now);
         self.spare_requests = answer.requests;
         outcome.map(|()| kept)
     }
@@ -358,7 +367,7 @@ impl<T: Tracer> Engine<T> {
                 false => self.canvas.replace(pixel, answer.now, rgb),
             };
             self.replaced.requests.push(*request);
-            self.replaced.before.push((previous, known));
+            self.replaced.before.push(Before { previous, known, is_refinement });
             self.replaced.old.push(old);
             self.replaced.new.push(rgb);
             self.replaced.surfaces.extend(answer.surfaces.get(i));
@@ -366,20 +375,55 @@ impl<T: Tracer> Engine<T> {
         Ok(())
     }
 
-    /// Tells the sampler what the samples just kept have changed. Returns how many they are.
-    fn observe(&mut self, now: Time) -> usize {
-        let Replaced { requests, before, old, new, surfaces } = &self.replaced;
-        let (size, is_noisy) = (self.canvas.size(), self.tracer.is_noisy());
-        let kept = Kept { now, size, requests, new, old, surfaces, is_noisy };
+    /// Tells the sampler what the samples just kept have changed: later, if the reconstruction, which says so, is away or has others to
+    /// look at before.
+    fn tell(&mut self, now: Time) {
+        self.observations.clear();
+        if self.beside.is_none() && self.late.is_empty() {
+            self.observe(now);
+        } else {
+            let spare = self.spare_replaced.pop().unwrap_or_default();
+            let replaced = std::mem::replace(&mut self.replaced, spare);
+            match &self.beside {
+                Some(beside) => beside.tell(now, replaced),
+                None => {
+                    self.late.push_back((now, replaced));
+                    (0..LATE_PER_ANSWER).for_each(|_| self.observe_late());
+                }
+            }
+        }
+        for _ in 0..UNHEARD_PER_ANSWER {
+            let Some(Told { now, replaced, findings }) = self.unheard.pop_front() else { return };
+            self.hear(now, &replaced, &findings);
+            self.spare_replaced.push(replaced);
+        }
+    }
+
+    fn observe_late(&mut self) {
+        let Some((now, replaced)) = self.late.pop_front() else { return };
+        self.spare_replaced.push(std::mem::replace(&mut self.replaced, replaced));
+        self.observe(now);
+    }
+
+    /// Finds out what the samples just kept have changed, and tells the sampler.
+    fn observe(&mut self, now: Time) {
         self.findings.changes.clear();
         self.findings.refinements.clear();
+        let kept = self.replaced.kept(now, self.canvas.size(), self.tracer.is_noisy());
         self.reconstruction.keep(&kept, &self.display, &mut self.findings);
+        let (replaced, findings) =
+            (std::mem::take(&mut self.replaced), std::mem::take(&mut self.findings));
+        self.hear(now, &replaced, &findings);
+        (self.replaced, self.findings) = (replaced, findings);
+    }
+
+    fn hear(&mut self, now: Time, replaced: &Replaced, findings: &Findings) {
         self.observations.clear();
         let now = now.as_kept();
-        let refinements = &self.findings.refinements;
-        let samples = requests.iter().zip(before).zip(&self.findings.changes).enumerate();
-        self.observations.extend(samples.map(|(i, ((request, &(previous, known)), &change))| {
-            let refinement = refinements.get(i).copied().flatten();
+        let samples = replaced.requests.iter().zip(&replaced.before).zip(&findings.changes);
+        self.observations.extend(samples.enumerate().map(|(i, ((request, before), &change))| {
+            let refinement = findings.refinements.get(i).copied().flatten();
+            let Before { previous, known, .. } = *before;
             Observation { pixel: request.pixel, now, previous, known, change, refinement }
         }));
         let told = match self.sampler.refines() {
@@ -387,8 +431,6 @@ impl<T: Tracer> Engine<T> {
             false => self.add_up.told(&self.observations),
         };
         self.sampler.observe(&self.canvas, told);
-        self.counters.kept += self.observations.len() as u64;
-        self.observations.len()
     }
 
     /// The picture at `now`, display-referred sRGB in [0, 1], row-major.
@@ -401,6 +443,10 @@ impl<T: Tracer> Engine<T> {
 
     /// As [`Engine::refresh`], for who keeps the picture: whatever `picture` held before is overwritten.
     pub fn refresh_into(&mut self, now: Time, picture: &mut Vec<[f32; 3]>) {
+        self.take_back();
+        self.is_first_picture = false;
+        // The time until the next answer will say nothing of how fast the renderer is.
+        self.clock.answered(0, false);
         let (secs, size) = (self.timeline.scene_secs(now), self.canvas.size());
         let pose = self.tracer.pose(secs, size, &mut self.pose).then_some(&self.pose);
         let lighting =
@@ -422,12 +468,91 @@ impl<T: Tracer> Engine<T> {
         self.reconstruction.refresh(&refresh, &mut self.canvas, picture);
     }
 
+    /// Begins to make the picture at `now` in a thread of its own; the loop goes on. `show` is given the picture in that thread, when it is ready,
+    /// with the canvas as it is then told to be: its colours are not those of the samples. Until the [turn](Engine::step) after that the sampler does not hear
+    /// of what new samples told.
+    ///
+    /// Returns whether it has begun: not while another is under way, and not where the picture is made of the canvas itself (by
+    /// [`Hold`] and [`Filter`](crate::Filter), or as the first of its size).
+    ///
+    /// # Panics
+    /// If the system has no thread left.
+    pub fn refresh_beside(
+        &mut self,
+        now: Time,
+        show: impl FnOnce(&[[f32; 3]], &Canvas) + Send + 'static,
+    ) -> bool {
+        let can = self.reconstruction.has_own_samples() && !self.is_first_picture;
+        if self.beside.is_some() || !can {
+            return false;
+        }
+        let (secs, size) = (self.timeline.scene_secs(now), self.canvas.size());
+        let order = Order {
+            now,
+            has_pose: self.tracer.pose(secs, size, &mut self.pose),
+            has_lighting: self.reconstruction.wants_lighting()
+                && self.tracer.lighting(secs, &mut self.lighting),
+            display: self.display,
+            is_noisy: self.tracer.is_noisy(),
+            rates: self.sampler.rates().filter(|rates| rates.size() == size).cloned(),
+            wants_motion: self.sampler.wants_motion(),
+            threads: self.refresh_threads,
+        };
+        self.tracer.spare_threads(order.threads);
+        let mut canvas = self.beside_canvas.take().unwrap_or_else(|| Canvas::new(size));
+        canvas.copy_times(&self.canvas);
+        let work = Work {
+            reconstruction: std::mem::replace(&mut self.reconstruction, Box::new(Hold::default())),
+            canvas,
+            picture: std::mem::take(&mut self.picture),
+            pose: std::mem::take(&mut self.pose),
+            lighting: std::mem::take(&mut self.lighting),
+            told: VecDeque::new(),
+        };
+        let late = std::mem::take(&mut self.late);
+        self.beside = Some(Beside::start(work, order, late, show));
+        true
+    }
+
+    /// Whether a picture is being made beside the loop.
+    pub fn is_refreshing(&self) -> bool {
+        self.beside.is_some()
+    }
+
+    fn take_back_if_done(&mut self) {
+        if self.beside.as_ref().is_some_and(Beside::is_done) {
+            self.take_back();
+        }
+    }
+
+    /// Waits for the picture that is being made beside the loop, if one is.
+    fn take_back(&mut self) {
+        let Some(beside) = self.beside.take() else { return };
+        let (work, late) = beside.end();
+        let Work { reconstruction, mut canvas, picture, pose, lighting, told } = work;
+        self.tracer.spare_threads(0);
+        self.reconstruction = reconstruction;
+        (self.picture, self.pose, self.lighting) = (picture, pose, lighting);
+        self.canvas.take_all_but_colours(&mut canvas);
+        self.beside_canvas = Some(canvas);
+        self.unheard.extend(told);
+        self.late = late;
+        // The canvas that was away knows nothing of them.
+        for (now, Replaced { requests, before, .. }) in &self.late {
+            for (request, _) in requests.iter().zip(before).filter(|(_, b)| !b.is_refinement) {
+                self.canvas.note(request.pixel, *now);
+            }
+        }
+    }
+
     /// Begin with a picture that is known already: its samples count as traced at their time, and nobody is told of changes.
     ///
     /// # Errors
     /// As [`Engine::step`].
     pub fn start_with(&mut self, answer: &Answer) -> Result<(), EngineError> {
+        self.take_back();
         self.keep(answer)?;
+        self.counters.kept += self.replaced.requests.len() as u64;
         self.observe(answer.now);
         Ok(())
     }
@@ -435,12 +560,16 @@ impl<T: Tracer> Engine<T> {
     /// Make pictures in another way from now on. What the canvas holds stays in its place; surfaces are learned anew. Also
     /// for a renderer that has been given another scene: surfaces of the one before mean nothing in it.
     pub fn set_reconstruction(&mut self, reconstruction: Box<dyn Reconstruction>) {
+        self.take_back();
         self.reconstruction = reconstruction;
         self.hand_over_canvas();
     }
 
     /// Gives the reconstruction what the canvas holds, as samples without surfaces, with their times.
     fn hand_over_canvas(&mut self) {
+        self.is_first_picture = true;
+        self.unheard.clear();
+        self.late.clear();
         let canvas = &self.canvas;
         let held = canvas.time().zip(canvas.known()).zip(0u32..);
         let held = held.filter(|((_, known), _)| *known).map(|((time, _), pixel)| (time, pixel));
@@ -462,6 +591,11 @@ impl<T: Tracer> Engine<T> {
             self.findings.changes.clear();
             self.reconstruction.keep(&kept, &self.display, &mut self.findings);
         }
+    }
+
+    /// Where its time comes from.
+    pub fn clock(&self) -> &Clock {
+        &self.clock
     }
 
     /// The present time of the engine's clock.
@@ -520,8 +654,7 @@ impl<T: Tracer> Engine<T> {
         &self.tracer
     }
 
-    /// The renderer, to change its camera or its scene; batches under way are answered with what they were
-    /// submitted with.
+    /// The renderer, to change its camera or its scene; what batches under way are answered with is for it to say.
     pub fn tracer_mut(&mut self) -> &mut T {
         &mut self.tracer
     }
@@ -564,6 +697,8 @@ impl<T: Tracer> Engine<T> {
     /// Go on in another size with the same picture, resampled. Batches under way are dropped when they come.
     pub fn resize(&mut self, size: Size) {
         if size != self.canvas.size() {
+            self.take_back();
+            self.beside_canvas = None;
             self.canvas = self.canvas.resized(size);
             self.first_batch = self.counters.batches;
             self.observations.clear();

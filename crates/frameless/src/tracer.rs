@@ -38,6 +38,14 @@ pub trait Tracer {
         false
     }
 
+    /// How many samples it traces at the same time: a batch has at least so many, however slow they are. The default is 1.
+    fn samples_at_once(&self) -> usize {
+        1
+    }
+
+    /// So many of the machine's cores are needed for something else, from now on; 0: none. The default goes on as before.
+    fn spare_threads(&mut self, _threads: usize) {}
+
     /// Fill in where everything is in a picture of `size` at `scene_secs`, for a renderer that returns surfaces and can
     /// tell; its samples are then carried along as things move. Returns whether it can; the default cannot.
     fn pose(&mut self, _scene_secs: f64, _size: Size, _pose: &mut Pose) -> bool {
@@ -62,6 +70,14 @@ impl<T: Tracer + ?Sized> Tracer for Box<T> {
 
     fn is_noisy(&self) -> bool {
         (**self).is_noisy()
+    }
+
+    fn samples_at_once(&self) -> usize {
+        (**self).samples_at_once()
+    }
+
+    fn spare_threads(&mut self, threads: usize) {
+        (**self).spare_threads(threads)
     }
 
     fn pose(&mut self, scene_secs: f64, size: Size, pose: &mut Pose) -> bool {

@@ -16,10 +16,12 @@ use crate::parse;
 /// Speeds are measured in alternating rounds of one run, and given as medians with the smallest and the
 /// largest round. Close other programs first.
 #[derive(ClapArgs)]
+#[command(args_override_self = true)]
 #[command(after_help = "Examples:
   frameless bench engine
   frameless bench engine --scene model.glb --threads 1
   frameless bench edit --scene model.glb --object Chair --rounds 3
+  frameless bench latency --scene model.glb --size 1280x720
   frameless bench sampler --json
   frameless bench rays --scene generated --rounds 5")]
 pub(crate) struct BenchArgs {
@@ -132,4 +134,10 @@ pub(crate) enum Benchmark {
     Still,
     /// Bare rays: how many per second on one thread, beside Embree 4 where it is found
     Rays,
+    /// Input: milliseconds until the first pixel shows it
+    Latency,
+    /// More threads: how many times as fast the loop is
+    Scaling,
+    /// Opening a scene: seconds until its first pixel, and the memory that it takes
+    Load,
 }

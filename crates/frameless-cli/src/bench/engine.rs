@@ -42,7 +42,7 @@ pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
         args.scene(),
         args.size.width,
         args.size.height,
-        threads(args),
+        super::threads(args),
         args.rounds,
         args.secs
     );
@@ -61,13 +61,6 @@ pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
     Ok(rows)
 }
 
-fn threads(args: &BenchArgs) -> usize {
-    match args.threads {
-        0 => std::thread::available_parallelism().map_or(1, usize::from),
-        threads => threads,
-    }
-}
-
 /// How fast the loop ran.
 struct Speed {
     samples_per_sec: f64,
@@ -77,7 +70,7 @@ struct Speed {
 fn speed(world: &Arc<World>, kind: SamplerKind, args: &BenchArgs, seed: u64) -> Speed {
     let settings = Settings { surfaces: false, ..Settings::default() };
     let view = ViewSource::Camera(0);
-    let tracer = CpuTracer::new(Arc::clone(world), view, settings, args.threads);
+    let tracer = CpuTracer::new(Arc::clone(world), view, settings, args.threads).in_real_time();
     let mut engine = Engine::new(args.size, Clock::real(), kind.build(seed), tracer);
     let mut run_for = |secs: f64| {
         let (begin, before) = (engine.now(), engine.counters());

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod bad_scenes;
+mod bench;
 mod compare;
 mod good_input;
 mod help;

@@ -9,6 +9,7 @@ use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use crate::Image;
 
+use super::buffers::View;
 use super::document::Document;
 use super::error::{Fault, one_line};
 use super::json::Json;
@@ -41,55 +42,87 @@ impl<'a> FileImage<'a> {
         Ok(FileImage { json: json.clone(), source })
     }
 
-    /// The picture, or the checker with a warning.
-    pub(super) fn decode(&self, document: &mut Document<'_>) -> Image {
-        self.try_decode(document).unwrap_or_else(|fault| {
-            let what = "images that cannot be read are replaced by a magenta checker";
-            document.warnings.about(what, self.called_with(&fault));
-            checker()
-        })
-    }
-
-    fn called_with(&self, fault: &Fault) -> String {
-        format!("{} ({})", self.json.called("image"), one_line(&fault.problem))
-    }
-
-    fn try_decode(&self, document: &mut Document<'_>) -> Result<Image, Fault> {
+    /// Holds the picture's header against the limits.
+    pub(super) fn open(&self, document: &mut Document<'_>) -> Result<Encoded, Fault> {
         let pointer = self.json.pointer();
-        match &self.source {
-            Source::Missing => Err(Fault::at(pointer, "a uri or a bufferView", "neither")),
-            Source::View(view) => {
-                decode(document.views[*view].bytes, pointer, &mut document.budget)
-            }
+        let bytes = match &self.source {
+            Source::Missing => return Err(Fault::at(pointer, "a uri or a bufferView", "neither")),
+            Source::View(view) => Bytes::View(*view),
             Source::Uri(uri) => {
-                let bytes = uri.read(pointer, document.folder, &mut document.budget)?;
-                decode(&bytes, pointer, &mut document.budget)
+                Bytes::Read(uri.read(pointer, document.folder, &mut document.budget)?)
             }
+        };
+        let limits = decoder_limits(&document.budget);
+        let encoded = Encoded { bytes, pointer: pointer.to_owned(), limits };
+        let bytes = encoded.bytes.get(&document.views);
+        let (width, height) = encoded.decoder(bytes)?.dimensions();
+        check_density(bytes, pointer, width, height)?;
+        document.budget.add_image(pointer, width, height)?;
+        if width == 0 || height == 0 {
+            return Err(Fault::at(pointer, "an image", "no pixels"));
+        }
+        Ok(encoded)
+    }
+
+    /// The checker, with a warning that says why.
+    pub(super) fn stand_in(&self, fault: &Fault, document: &mut Document<'_>) -> Image {
+        let what = "images that cannot be read are replaced by a magenta checker";
+        let called = self.json.called("image");
+        document.warnings.about(what, format!("{called} ({})", one_line(&fault.problem)));
+        checker()
+    }
+}
+
+/// A picture that may be decoded, in any thread.
+#[derive(Debug)]
+pub(super) struct Encoded {
+    bytes: Bytes,
+    pointer: String,
+    limits: image::Limits,
+}
+
+#[derive(Debug)]
+enum Bytes {
+    /// Of the buffer view with this index.
+    View(usize),
+    /// Of a file of its own.
+    Read(Vec<u8>),
+}
+
+impl Bytes {
+    fn get<'b>(&'b self, views: &[View<'b>]) -> &'b [u8] {
+        match self {
+            Bytes::View(view) => views[*view].bytes,
+            Bytes::Read(bytes) => bytes,
         }
     }
 }
 
-/// Decodes an encoded picture after its header has been held against the limits.
-fn decode(bytes: &[u8], pointer: &str, budget: &mut Budget) -> Result<Image, Fault> {
-    let failed = |error: &dyn std::fmt::Display| Fault::at(pointer, "an image", error);
-    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
-    let mut reader = reader.map_err(|error| failed(&error))?;
-    if !matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP)) {
-        return Err(Fault::at(pointer, "a PNG, JPEG or WebP image", "other bytes"));
+impl Encoded {
+    fn fault(&self, error: &dyn std::fmt::Display) -> Fault {
+        Fault::at(&self.pointer, "an image", error)
     }
-    reader.limits(decoder_limits(budget));
-    let decoder = reader.into_decoder().map_err(|error| failed(&error))?;
-    let (width, height) = decoder.dimensions();
-    check_density(bytes, pointer, width, height)?;
-    budget.add_image(pointer, width, height)?;
-    if width == 0 || height == 0 {
-        return Err(Fault::at(pointer, "an image", "no pixels"));
+
+    fn decoder<'b>(&self, bytes: &'b [u8]) -> Result<impl ImageDecoder + 'b, Fault> {
+        let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+        let mut reader = reader.map_err(|error| self.fault(&error))?;
+        let known = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::WebP];
+        if !reader.format().is_some_and(|format| known.contains(&format)) {
+            return Err(Fault::at(&self.pointer, "a PNG, JPEG or WebP image", "other bytes"));
+        }
+        reader.limits(self.limits.clone());
+        reader.into_decoder().map_err(|error| self.fault(&error))
     }
-    let decoded = DynamicImage::from_decoder(decoder).map_err(|error| failed(&error))?;
-    // In place: a copy would be the largest thing in memory.
-    let rgba = bytemuck::try_cast_vec(decoded.into_rgba8().into_raw());
-    let rgba = rgba.map_err(|(error, _)| failed(&error))?;
-    Ok(Image { width, height, rgba })
+
+    pub(super) fn decode(&self, views: &[View<'_>]) -> Result<Image, Fault> {
+        let decoder = self.decoder(self.bytes.get(views))?;
+        let (width, height) = decoder.dimensions();
+        let decoded = DynamicImage::from_decoder(decoder).map_err(|error| self.fault(&error))?;
+        // In place: a copy would be the largest thing in memory.
+        let rgba = bytemuck::try_cast_vec(decoded.into_rgba8().into_raw());
+        let rgba = rgba.map_err(|(error, _)| self.fault(&error))?;
+        Ok(Image { width, height, rgba })
+    }
 }
 
 /// Refuses a picture of a few bytes that claims gigabytes, as one colour over 16,384 × 16,384 pixels does.

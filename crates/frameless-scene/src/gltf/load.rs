@@ -123,7 +123,8 @@ fn build(document: &mut Document<'_>, choice: &Choice) -> Result<Scene, Fault> {
     let mut textures = Textures::parse(&root, document.views.len())?;
     let mut scene =
         Scene { materials: load_materials(document, &mut textures)?, ..Scene::default() };
-    (scene.textures, scene.images) = (textures.textures, textures.images);
+    scene.images = textures.decode(document);
+    scene.textures = textures.textures;
     scene.geometries = load_meshes(document, &scene.materials)?;
     add_default_material(&mut scene);
     let skins = load_skins(document, &hierarchy)?;

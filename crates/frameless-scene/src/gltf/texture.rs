@@ -3,12 +3,13 @@
 use std::collections::HashMap;
 
 use glam::Vec2;
+use rayon::prelude::*;
 
 use crate::{Filter, Image, Minify, Texture, TextureRef, UV_SETS, Wrap};
 
 use super::document::Document;
 use super::error::Fault;
-use super::image::FileImage;
+use super::image::{Encoded, FileImage};
 use super::json::Json;
 
 /// The file's textures, and those that the scene has got so far.
@@ -17,8 +18,9 @@ pub(super) struct Textures<'a> {
     file_textures: Vec<FileTexture>,
     texture_of: HashMap<usize, u32>,
     image_of: HashMap<usize, u32>,
+    /// Those that are shown, in the order of the scene's: number in the file, and the bytes if they may be decoded.
+    shown: Vec<(usize, Result<Encoded, Fault>)>,
     pub(super) textures: Vec<Texture>,
-    pub(super) images: Vec<Image>,
 }
 
 /// A texture of the file; its references are in bounds.
@@ -51,8 +53,8 @@ impl<'a> Textures<'a> {
             file_images,
             texture_of: HashMap::new(),
             image_of: HashMap::new(),
+            shown: Vec::new(),
             textures: Vec::new(),
-            images: Vec::new(),
         })
     }
 
@@ -117,10 +119,24 @@ impl<'a> Textures<'a> {
         if let Some(&known) = self.image_of.get(&file_image) {
             return known;
         }
-        let index = self.images.len() as u32;
-        self.images.push(self.file_images[file_image].decode(document));
+        let index = self.shown.len() as u32;
+        self.shown.push((file_image, self.file_images[file_image].open(document)));
         self.image_of.insert(file_image, index);
         index
+    }
+
+    /// The pictures that are shown, decoded on all cores; checkers with a warning for those that cannot be.
+    pub(super) fn decode(&mut self, document: &mut Document<'_>) -> Vec<Image> {
+        let (shown, views) = (std::mem::take(&mut self.shown), &document.views);
+        let decoded = shown
+            .into_par_iter()
+            .map(|(number, encoded)| (number, encoded.and_then(|encoded| encoded.decode(views))));
+        let decoded: Vec<(usize, Result<Image, Fault>)> = decoded.collect();
+        let images = decoded.into_iter().map(|(number, image)| {
+            let file_image = &self.file_images[number];
+            image.unwrap_or_else(|fault| file_image.stand_in(&fault, document))
+        });
+        images.collect()
     }
 }
 

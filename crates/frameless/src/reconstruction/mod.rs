@@ -70,6 +70,11 @@ pub trait Reconstruction: Send {
         let _ = (now, canvas, requests);
     }
 
+    /// Whether a refresh needs no colours of the canvas, but for the first of a size.
+    fn has_own_samples(&self) -> bool {
+        false
+    }
+
     /// Whether [`Refresh::lighting`] is of use.
     fn wants_lighting(&self) -> bool {
         false

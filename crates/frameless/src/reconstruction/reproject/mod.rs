@@ -222,6 +222,10 @@ impl Reconstruction for Reproject {
         }
     }
 
+    fn has_own_samples(&self) -> bool {
+        true
+    }
+
     fn wants_lighting(&self) -> bool {
         self.options.relight
     }
