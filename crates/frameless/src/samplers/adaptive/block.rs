@@ -38,10 +38,12 @@ impl Block {
             q[half..half + BLOCK / 2].copy_from_slice(&eight.lanes());
         }
         let shares = sum(&q);
-        if shares <= 0.0 {
+        let part = got / shares;
+        // Nor where shares are too small for numbers: nobody is drawn without end.
+        if shares <= 0.0 || !part.is_finite() {
             return;
         }
-        let part = F8::<U>::splat(got / shares);
+        let part = F8::<U>::splat(part);
         let mut ripe = 0;
         for half in [0, BLOCK / 2] {
             let credit = F8::load(&self.credit, half) + part * F8::load(&q, half);
@@ -104,5 +106,8 @@ mod tests {
         block = Block::default();
         wide::run(Turns(&mut block, 5.0, &mut Vec::new()));
         assert_eq!(block.credit, [0.0; BLOCK], "nobody has a share");
+        block.weight[5] = f32::from_bits(1);
+        wide::run(Turns(&mut block, 5.0, &mut Vec::new()));
+        assert_eq!(block.credit, [0.0; BLOCK], "shares so small that a draw of them is infinite");
     }
 }

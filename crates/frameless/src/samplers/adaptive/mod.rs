@@ -290,7 +290,8 @@ impl Sampler for Adaptive {
             state.look(canvas);
         }
         let unknown = canvas.holes().len() as f32 / canvas.size().pixels() as f32;
-        let hole_share = HOLE_SHARE.max(unknown);
+        // A pixel may wait for two reasons.
+        let hole_share = HOLE_SHARE.max(unknown).min(1.0);
         if without != Some(AdaptiveStage::Holes) {
             state.choose_holes(canvas, (hole_share * count as f32) as usize, requests);
         }
@@ -443,6 +444,19 @@ mod tests {
         blocks.sort_unstable();
         blocks.dedup();
         assert_eq!(blocks.len(), 16);
+    }
+
+    #[test]
+    fn pixels_that_wait_twice_take_no_more_than_the_batch() {
+        let size = Size::new(64, 32);
+        let mut canvas = Canvas::new(size);
+        let mut holes: Vec<u32> = (0..2048).chain(0..1024).collect();
+        let mut marks = canvas.traced().tiles().to_vec();
+        canvas.update(Time(1), &mut holes, &mut marks);
+        for count in [1, 100, 2000] {
+            let chosen = choose(&mut Adaptive::new(DEFAULT_TEMPORAL, 1), &canvas, count).len();
+            assert!(chosen.abs_diff(count) <= 1, "{chosen} of {count}");
+        }
     }
 
     #[test]
