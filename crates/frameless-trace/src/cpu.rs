@@ -52,13 +52,16 @@ pub struct CpuTracer {
 /// Memory of finished batches: one per batch that has ever been under way at the same time.
 type Idle = Arc<Mutex<Vec<Workspace>>>;
 
+/// Samples of a part of a batch.
+type Piece = Vec<([f32; 3], Surface)>;
+
 #[derive(Default)]
 struct Workspace {
     /// Its own, but for a scene that has a [`Latest`]: that moment is let go when the batch is finished.
     moment: Option<Arc<Moment>>,
     order: Vec<u32>,
     /// Of each piece, in the order of `order`.
-    samples: Vec<Mutex<Vec<([f32; 3], Surface)>>>,
+    samples: Vec<Mutex<Piece>>,
 }
 
 /// Where the camera is, for who moves it from another thread: what is not being traced yet is seen from there.

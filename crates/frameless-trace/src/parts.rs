@@ -90,12 +90,12 @@ fn join(top: &Bvh2, parts: Vec<Bvh2>) -> Bvh2 {
     for (part, leaf) in parts.into_iter().zip(leaf_of) {
         // Of a part's nodes all but the root move, in pairs, behind those that are there.
         let (nodes, indices) = (all.nodes.len() as u32, all.primitive_indices.len() as u32);
-        let placed = |node: &Bvh2Node| {
+        let mut placed = part.nodes.iter().map(|node| {
             let by = if node.is_leaf() { indices } else { nodes.wrapping_sub(1) };
             Bvh2Node { first_index: node.first_index.wrapping_add(by), ..*node }
-        };
-        all.nodes[leaf] = placed(&part.nodes[0]);
-        all.nodes.extend(part.nodes[1..].iter().map(placed));
+        });
+        all.nodes[leaf] = placed.next().expect("a part has a root");
+        all.nodes.extend(placed);
         all.primitive_indices.extend_from_slice(&part.primitive_indices);
     }
     all
@@ -105,7 +105,7 @@ fn join(top: &Bvh2, parts: Vec<Bvh2>) -> Bvh2 {
 fn divide(boxes: &[Aabb], order: &mut [u32]) -> Vec<Range<usize>> {
     fn halve(boxes: &[Aabb], order: &mut [u32], first: usize) -> Vec<Range<usize>> {
         if order.len() <= PART {
-            return vec![first..first + order.len()];
+            return std::iter::once(first..first + order.len()).collect();
         }
         let at = split(boxes, order);
         let (left, right) = order.split_at_mut(at);
