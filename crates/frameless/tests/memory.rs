@@ -96,8 +96,8 @@ fn a_pixel_takes_no_more_than_it_may() {
     let bounds = [
         ("hold", 48.0),
         // Wanted: 96 and 224.
-        ("reproject", 290.0),
-        ("reproject+deep", 740.0),
+        ("reproject", 245.0),
+        ("reproject+deep", 660.0),
     ];
     for (kind, most) in bounds {
         let bytes = bytes_per_px(kind);
