@@ -318,7 +318,7 @@ class Canvas:
         """(width, height) in pixels."""
     @property
     def time(self) -> NDArray[np.float64]:
-        """When each pixel was traced last, in seconds, 0 if never: float64, shape (height · width,), a copy."""
+        """When each pixel was traced last, in seconds, rounded down to 16 µs, 0 if never: float64, shape (height · width,), a copy."""
     @property
     def rgb(self) -> _Floats32:
         """Newest sample of each pixel, linear RGB: float32, shape (height · width, 3), a copy."""
