@@ -139,7 +139,7 @@ pub(crate) struct RenderArgs {
     pub(crate) exposure: f32,
 
     /// How what is brighter than white is brought into range: neutral (Khronos PBR Neutral), agx (as in Blender), aces (as fitted by Hill), or none: it is white
-    #[arg(long, value_name = "NAME", default_value = "none", value_parser = parse::tone_map)]
+    #[arg(long, value_name = "NAME", default_value = ToneMap::default().name(), value_parser = parse::tone_map)]
     pub(crate) tone_map: ToneMap,
 
     #[command(flatten)]

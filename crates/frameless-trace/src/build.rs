@@ -14,6 +14,7 @@ use crate::kernel::Pack;
 use crate::pages::prefer_large_pages;
 use crate::parts::{Of, PART, build_in_parts};
 use crate::traverse::STACK_PER_TREE;
+use crate::untied::Ploc;
 use crate::wide::{Child, Node, collapse};
 
 /// A mesh's bottom-level BVH: triangles copied into packs of four, in the order of the leaves.
@@ -134,13 +135,13 @@ pub(crate) fn cluster(boxes: &[Aabb], most_per_leaf: u32) -> Bvh2 {
         return one_leaf(boxes);
     }
     let preset = BvhBuildParams::medium_build();
-    let mut binary = PlocBuilder::with_capacity(boxes.len()).build(
-        preset.ploc_search_distance,
-        boxes,
-        (0..boxes.len() as u32).collect(),
-        preset.sort_precision,
-        preset.search_depth_threshold,
-    );
+    let ploc = Ploc {
+        search_distance: preset.ploc_search_distance,
+        sort_precision: preset.sort_precision,
+        search_depth_threshold: preset.search_depth_threshold,
+    };
+    let mut binary = Bvh2::zeroed(boxes.len());
+    ploc.build(&mut PlocBuilder::with_capacity(boxes.len()), boxes, &mut binary);
     let mut optimizer = ReinsertionOptimizer::default();
     let ratio = preset.reinsertion_batch_ratio;
     optimizer.run(&mut binary, ratio, None);

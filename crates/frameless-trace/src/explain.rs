@@ -1,6 +1,6 @@
 //! One pixel in words.
 
-use frameless::{Display, Request, Size};
+use frameless::{Display, Request, Size, ToneMap};
 
 use crate::camera::{Camera, ViewSource};
 use crate::direct::Probe;
@@ -15,7 +15,7 @@ impl Probe for Vec<String> {
 }
 
 /// How a sample's colour comes about: the ray, what it hits at every bounce, the surface, each light with its visibility
-/// and contribution, and the colour, linear and sRGB. Traces with the very code that fills pictures.
+/// and contribution, and the colour, linear and as it is shown. Traces with the very code that fills pictures.
 pub fn explain(
     world: &World,
     secs: f64,
@@ -39,7 +39,11 @@ pub fn explain(
     let (rgb, surface) =
         world.sample_with(&moment, &camera, request, settings, &mut Stack::new(), &mut lines);
     lines.push(format!("first surface: {surface:?}"));
-    let [r, g, b, _] = Display::new(0.0).encode_rgba8(rgb);
-    lines.push(format!("linear RGB {rgb:?}, sRGB at exposure 0: {:?}", [r, g, b]));
+    let shown = |tone_map: ToneMap| {
+        let [r, g, b, _] = Display::new(0.0).with_tone_map(tone_map).encode_rgba8(rgb);
+        format!("{:?} (tone mapping {})", [r, g, b], tone_map.name())
+    };
+    let (by_default, plain) = (shown(ToneMap::default()), shown(ToneMap::None));
+    lines.push(format!("linear RGB {rgb:?}, sRGB at exposure 0: {by_default}, {plain}"));
     lines
 }

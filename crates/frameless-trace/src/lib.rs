@@ -49,6 +49,7 @@ mod tangent;
 mod texture;
 mod top;
 mod traverse;
+mod untied;
 mod wide;
 mod world;
 

@@ -20,6 +20,7 @@ use crate::sift::{NoSieve, Stops};
 use crate::sphere;
 use crate::standing::Standing;
 use crate::traverse::{Leaves, STACK_PER_TREE, Stack, walk};
+use crate::untied::Ploc;
 use crate::wide::{Child, Node, collapse};
 
 /// What stands in an instance.
@@ -121,6 +122,13 @@ impl Placed {
     }
 }
 
+/// Quickly: it is built for every moment.
+const PLOC: Ploc = Ploc {
+    search_distance: PlocSearchDistance::Minimum,
+    sort_precision: SortPrecision::U64,
+    search_depth_threshold: 0,
+};
+
 /// The tree over the instances, with the memory to build it again.
 pub(crate) struct Top {
     pub(crate) nodes: Vec<Node>,
@@ -161,17 +169,7 @@ impl Top {
                 self.instances.push(instance as u32);
             }
         }
-        let mut indices = std::mem::take(&mut self.binary.primitive_indices);
-        indices.clear();
-        indices.extend(0..self.boxes.len() as u32);
-        self.builder.build_with_bvh(
-            &mut self.binary,
-            PlocSearchDistance::Minimum,
-            &self.boxes,
-            indices,
-            SortPrecision::U64,
-            0,
-        );
+        PLOC.build(&mut self.builder, &self.boxes, &mut self.binary);
         if self.take() > STACK_PER_TREE {
             self.binary = binary_by_median(&self.boxes);
             self.take();

@@ -5,7 +5,7 @@
 
 use std::hint::select_unpredictable;
 
-use crate::ToneMap;
+use crate::tone_map::{ToneMap, neutral_of_eight};
 use crate::wide::{F8, Unit};
 
 /// How linear radiance becomes a display colour.
@@ -54,19 +54,22 @@ impl Display {
 
     /// [`Display::encode`], eight at a time.
     #[inline(always)]
-    pub(crate) fn encode_eight<U: Unit>(&self, [r, g, b]: [F8<U>; 3]) -> [F8<U>; 3] {
-        if self.tone_map == ToneMap::None {
-            let gain = F8::splat(self.gain);
-            return [
-                srgb_from_eight_linear(r * gain),
-                srgb_from_eight_linear(g * gain),
-                srgb_from_eight_linear(b * gain),
-            ];
+    pub(crate) fn encode_eight<U: Unit>(&self, rgb: [F8<U>; 3]) -> [F8<U>; 3] {
+        let mut exposed = rgb;
+        for channel in &mut exposed {
+            *channel = *channel * F8::splat(self.gain);
         }
-        let mut mapped = F8::triples([r, g, b]);
-        mapped.iter_mut().for_each(|rgb| *rgb = self.encode_mapped(*rgb));
-        let channel = |k: usize| F8::new(std::array::from_fn(|lane| mapped[lane][k]));
-        [channel(0), channel(1), channel(2)]
+        let [r, g, b] = match self.tone_map {
+            ToneMap::None => exposed,
+            ToneMap::Neutral => neutral_of_eight(exposed),
+            ToneMap::Agx | ToneMap::Aces => {
+                let mut mapped = F8::triples(exposed);
+                mapped.iter_mut().for_each(|rgb| *rgb = self.tone_map.apply(*rgb));
+                let channel = |k: usize| F8::new(std::array::from_fn(|lane| mapped[lane][k]));
+                [channel(0), channel(1), channel(2)]
+            }
+        };
+        [srgb_from_eight_linear(r), srgb_from_eight_linear(g), srgb_from_eight_linear(b)]
     }
 
     /// Apart, so that loops that map no tones stay small.

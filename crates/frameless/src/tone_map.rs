@@ -3,20 +3,23 @@
 //! All take linear Rec. 709 RGB ≥ 0, exposed, and give linear Rec. 709 RGB in [0, 1]. Black stays black, and a brighter grey is never darker.
 
 mod agx;
+mod neutral;
 
 use agx::agx;
+use neutral::neutral;
+pub(crate) use neutral::neutral_of_eight;
 
 /// A tone mapping.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ToneMap {
     /// Khronos PBR Neutral: base colours as they are up to 0.76, highlights compressed and desaturated.
+    #[default]
     Neutral,
     /// AgX by Sobotka, as Blender has it: bright colours turn pale before they turn white, as on film.
     Agx,
     /// The ACES reference rendering and sRGB output transforms, as fitted by Hill: the contrast of film.
     Aces,
     /// What is brighter than white is white, channel by channel: colours as they are, and hard edges around what is too bright.
-    #[default]
     None,
 }
 
@@ -65,33 +68,6 @@ impl ToneMap {
 
 /// Beyond that every curve has reached its end, and squares would overflow.
 const BRIGHTEST: f32 = 1e6;
-
-/// ```text
-/// o = x − 6.25 x² if x < 0.08, else 0.04        x = min(R, G, B): the reflection of light that base colours do not have
-/// p = max(C − o)
-/// p′ = 1 − (1 − s)² / (p + 1 − 2 s)             s = 0.8 − 0.04, where compression starts
-/// C′ = mix((C − o) p′/p, p′, 1 − 1 / (0.15 (p − p′) + 1))
-/// ```
-///
-/// Khronos PBR Neutral Tone Mapper, specification 1.0 (2024), §3; C − o alone where p < s.
-fn neutral(rgb: [f32; 3]) -> [f32; 3] {
-    const START: f32 = 0.8 - 0.04;
-    const DESATURATION: f32 = 0.15;
-    let least = rgb.into_iter().fold(f32::INFINITY, f32::min);
-    let offset = if least < 0.08 { least - 6.25 * least * least } else { 0.04 };
-    let rgb = rgb.map(|channel| channel - offset);
-    let peak = rgb.into_iter().fold(0.0, f32::max);
-    if peak < START {
-        return rgb;
-    }
-    let d = 1.0 - START;
-    let new_peak = 1.0 - d * d / (peak + d - START);
-    let white = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
-    rgb.map(|channel| {
-        let scaled = channel * (new_peak / peak);
-        scaled + (new_peak - scaled) * white
-    })
-}
 
 /// ```text
 /// C′ = O f(I C)        f(v) = (v (v + 0.0245786) − 0.000090537) / (v (0.983729 v + 0.4329510) + 0.238081)

@@ -162,6 +162,12 @@ impl<U: Unit> F8<U> {
         self.or(least.less_than(self), least)
     }
 
+    /// `most` where there is more.
+    #[inline(always)]
+    pub(crate) fn at_most(self, most: Self) -> Self {
+        most.or(most.less_than(self), self)
+    }
+
     /// To [0, 1].
     #[inline(always)]
     pub(crate) fn clamped(self) -> Self {

@@ -73,10 +73,10 @@ fn tone_mapping_keeps_what_would_be_clipped_apart() {
     };
     let clipped = white(&["--tone-map", "none"]);
     assert!(clipped > 100, "{clipped} channels are white");
-    assert_eq!(white(&[]), clipped);
     for name in ["neutral", "agx", "aces"] {
         assert!(white(&["--tone-map", name]) < clipped / 4, "{name}");
     }
+    assert!(white(&[]) < clipped / 4, "tones are mapped unless told otherwise");
 }
 
 #[test]

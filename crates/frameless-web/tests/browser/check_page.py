@@ -270,7 +270,7 @@ def sets_what_the_panel_offers(bench: Bench) -> str:
     page.locator("#exposure").fill("0")
     page.select_option("#tone-map", "agx")
     other.wait("document.querySelector('#tone-map').value === 'agx'")
-    page.select_option("#tone-map", "none")
+    page.select_option("#tone-map", "neutral")
     page.check("[name=reconstruction][value=reproject]", force=True)
     page.uncheck("#antialias")
     page.select_option("#sampler", "adaptive")
