@@ -109,7 +109,9 @@ impl LimitArgs {
         Some(match what {
             "decoded bytes" | "bytes of file" | "keyframes" | "JSON values" => "--max-memory",
             "triangles" | "vertices" => "--max-triangles",
-            "pixels in one image" | "pixels in all images" => "--max-texture-pixels",
+            "pixels in one image" | "pixels in all images" | "pixels in images of few bytes" => {
+                "--max-texture-pixels"
+            }
             "nodes" => "--max-nodes",
             "levels of nodes" => "--max-nesting",
             "instances" => "--max-instances",

@@ -1,9 +1,12 @@
 //! An object jumps while the scene plays: how long until the pixels that it changes are right again, with paths, on the real clock.
+//!
+//! Which object, unless one is named: of those that cover from 1 % to 10 % of the picture, the one that covers most. Smaller ones say little, and
+//! larger ones are not what one moves.
 
 use std::sync::Arc;
 
 use anyhow::anyhow;
-use frameless::{Clock, Display, Engine, ReconstructionKind, SamplerKind};
+use frameless::{Clock, Display, Engine, ReconstructionKind, Request, SamplerKind, Size};
 use frameless_scene::{AfterEnd, Channel, Interpolation, Limits, Scene, Target, Values};
 use frameless_trace::{
     CpuTracer, Integrator, Settings, Still, ViewSource, World, render_still, thread_pool,
@@ -35,7 +38,17 @@ const RIGHT: f32 = 0.05;
 /// `edit.samples_per_sec`.
 pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
     let mut scene = input::scene(args.scene(), &args.choice(), &Limits::default())?;
-    let name = let_jump(&mut scene, args.object())?;
+    let node = match args.object() {
+        Some(name) => named(&scene, name),
+        None => most_seen(&scene, args.size),
+    };
+    let node = node.ok_or_else(|| match args.object() {
+        Some(_) => Failure::bad_input(anyhow!("--object: nothing to be seen has that name")),
+        None => Failure::bad_input(anyhow!(
+            "nothing covers from 1 % to 10 % of the picture: name what is to move with --object"
+        )),
+    })?;
+    let name = let_jump(&mut scene, node);
     let world = Arc::new(World::new(Arc::new(scene)));
     let [before, after] = [0.0, JUMP_SECS + 1.0].map(|secs| ideal(&world, secs, args));
     let changed: Vec<usize> =
@@ -68,13 +81,34 @@ pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
     ])
 }
 
-/// Lets an object jump, which stands still otherwise; returns its name.
-fn let_jump(scene: &mut Scene, object: Option<&str>) -> Result<String, Failure> {
-    let named = |node: u32| object.is_none_or(|name| scene.nodes[node as usize].name == name);
-    let node = scene.instances.iter().map(|instance| instance.node).find(|&node| named(node));
-    let Some(node) = node else {
-        return Err(Failure::bad_input(anyhow!("--object: nothing to be seen has that name")));
-    };
+/// The node of that name, if something stands there.
+fn named(scene: &Scene, name: &str) -> Option<u32> {
+    let mut nodes = scene.instances.iter().map(|instance| instance.node);
+    nodes.find(|&node| scene.nodes[node as usize].name == name)
+}
+
+/// The node of the object that covers most pixels among those with 1 % to 10 % of them.
+fn most_seen(scene: &Scene, size: Size) -> Option<u32> {
+    let world = World::new(Arc::new(scene.clone()));
+    let moment = world.moment(0.0);
+    let view = scene.view_at(moment.state(), 0);
+    let mut pixels = vec![0; scene.instances.len()];
+    for pixel in 0..size.pixels() as u32 {
+        let (_, seen) = world.trace(&moment, &view, size, &Request::centre(pixel), &PATH);
+        // Not the sky, nor images in mirrors.
+        if let Some(pixels) = pixels.get_mut(seen.object as usize) {
+            *pixels += 1;
+        }
+    }
+    let some = size.pixels() / 100..=size.pixels() / 10;
+    let seen = scene.instances.iter().zip(pixels).filter(|(_, pixels)| some.contains(pixels));
+    // Of those that are seen equally much the first.
+    let most = seen.rev().max_by_key(|(_, pixels)| *pixels);
+    most.map(|(instance, _)| instance.node)
+}
+
+/// Lets what is at a node jump, which stands still otherwise; returns its name.
+fn let_jump(scene: &mut Scene, node: u32) -> String {
     let (placed, state) = (&scene.nodes[node as usize], scene.state_at(0.0));
     let jump = match placed.parent {
         None => JUMP_M,
@@ -83,7 +117,11 @@ fn let_jump(scene: &mut Scene, object: Option<&str>) -> Result<String, Failure> 
             (parent * glam::Vec3A::from(JUMP_M)).into()
         }
     };
-    let (name, place) = (placed.name.clone(), placed.rest.translation);
+    let place = placed.rest.translation;
+    let name = match placed.name.as_str() {
+        "" => format!("node {node}"),
+        name => name.to_owned(),
+    };
     let animation = &mut scene.animation;
     animation.channels.retain(|channel| channel.target != Target::Translation(node));
     animation.channels.push(Channel {
@@ -94,7 +132,7 @@ fn let_jump(scene: &mut Scene, object: Option<&str>) -> Result<String, Failure> 
     });
     animation.duration_secs = animation.duration_secs.max(JUMP_SECS + WATCHED_SECS + 1.0);
     animation.after_end = AfterEnd::Hold;
-    Ok(name)
+    name
 }
 
 /// Display-referred.
@@ -192,13 +230,37 @@ mod tests {
     #[test]
     fn an_object_jumps_once_by_ten_centimetres_of_the_world() {
         let mut scene = frameless_scene::builtin("sphere").expect("it is built in");
-        let name = let_jump(&mut scene, None).expect("there is an object");
-        let node = scene.instances[0].node as usize;
-        assert_eq!(scene.nodes[node].name, name);
+        let node = scene.instances[0].node;
+        let name = let_jump(&mut scene, node);
+        assert_eq!(named(&scene, &name), Some(node));
+        assert_eq!(named(&scene, "nobody"), None);
+        let node = node as usize;
         let at = |secs: f64| scene.state_at(secs).world_from_node[node].translation;
         assert_eq!(at(0.0), at(JUMP_SECS - 0.01));
         let jump = at(JUMP_SECS) - at(0.0);
         assert!(jump.abs_diff_eq(JUMP_M.into(), 1e-5), "{jump}");
-        assert!(let_jump(&mut scene, Some("nobody")).is_err());
+    }
+
+    #[test]
+    fn what_moves_is_seen_much_but_not_too_much() {
+        let scene = frameless_scene::builtin("sphere").expect("it is built in");
+        let size = Size::new(64, 48);
+        let node = most_seen(&scene, size).expect("something is of that size");
+        let world = World::new(Arc::new(scene.clone()));
+        let moment = world.moment(0.0);
+        let view = scene.view_at(moment.state(), 0);
+        let seen = |pixel| world.trace(&moment, &view, size, &Request::centre(pixel), &PATH).1;
+        let objects: Vec<u32> = (0..size.pixels() as u32).map(|pixel| seen(pixel).object).collect();
+        let covers = |at: u32| {
+            let is_there = |object: &&u32| {
+                scene.instances.get(**object as usize).is_some_and(|seen| seen.node == at)
+            };
+            objects.iter().filter(is_there).count()
+        };
+        let (covered, all) = (covers(node), size.pixels());
+        assert!((all / 100..=all / 10).contains(&covered), "{covered} of {all}");
+        for other in &scene.instances {
+            assert!(covers(other.node) <= covered || covers(other.node) > all / 10);
+        }
     }
 }

@@ -56,8 +56,7 @@ impl<'a> FileImage<'a> {
         let encoded = Encoded { bytes, pointer: pointer.to_owned(), limits };
         let bytes = encoded.bytes.get(&document.views);
         let (width, height) = encoded.decoder(bytes)?.dimensions();
-        check_density(bytes, pointer, width, height)?;
-        document.budget.add_image(pointer, width, height)?;
+        document.budget.add_image(pointer, width, height, bytes.len())?;
         if width == 0 || height == 0 {
             return Err(Fault::at(pointer, "an image", "no pixels"));
         }
@@ -123,20 +122,6 @@ impl Encoded {
         let rgba = rgba.map_err(|(error, _)| self.fault(&error))?;
         Ok(Image { width, height, rgba })
     }
-}
-
-/// Refuses a picture of a few bytes that claims gigabytes, as one colour over 16,384 × 16,384 pixels does.
-fn check_density(bytes: &[u8], pointer: &str, width: u32, height: u32) -> Result<(), Fault> {
-    /// Two pictures of 4096 × 4096 pixels: 180 MB with their smaller copies.
-    const ALWAYS: u64 = 1 << 25;
-    /// Drawings of a few flat colours have 10 to 50.
-    const PIXELS_PER_BYTE: u64 = 64;
-    let most = ALWAYS + PIXELS_PER_BYTE * bytes.len() as u64;
-    if u64::from(width) * u64::from(height) <= most {
-        return Ok(());
-    }
-    let wanted = format!("at most {most} pixels in {} bytes", bytes.len());
-    Err(Fault::at(pointer, wanted, format_args!("{width} × {height}")))
 }
 
 fn decoder_limits(budget: &Budget) -> image::Limits {

@@ -1,6 +1,7 @@
 //! The file's lights: KHR_lights_punctual.
 
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
+use std::fmt::Display;
 
 use glam::Vec3;
 
@@ -34,12 +35,19 @@ pub(super) fn load_lights(root: &Json<'_>, hierarchy: &Hierarchy) -> Result<Vec<
 fn parse_light(json: &Json<'_>) -> Result<Light, Fault> {
     let color = Vec3::from_array(json.numbers_or("color", [1.0; 3])?);
     let intensity = json.number_or("intensity", 1.0)?;
-    if intensity < 0.0 || color.min_element() < 0.0 || !(color * intensity).is_finite() {
-        return Err(json.fault("a light whose colour and intensity are not negative"));
+    let wrong = |field: &str, wanted: &str, came: &dyn Display| {
+        Err(Fault::at(&format!("{}/{field}", json.pointer()), wanted, came))
+    };
+    if color.min_element() < 0.0 {
+        return wrong("color", "parts that are not negative", &color);
+    }
+    if intensity < 0.0 || !(color * intensity).is_finite() {
+        let wanted = "a number that is not negative, and finite times the colour";
+        return wrong("intensity", wanted, &intensity);
     }
     let range = json.number_or("range", f32::INFINITY)?;
     if range <= 0.0 {
-        return Err(json.fault("a light with a range above 0"));
+        return wrong("range", "a length above 0", &range);
     }
     let kind = json.required("type")?;
     let kind = match kind.text()? {
@@ -58,7 +66,8 @@ fn parse_cone(json: &Json<'_>) -> Result<LightKind, Fault> {
     // Exporters write π/2 with too few digits, or equal angles for a sharp border.
     const SLACK_RAD: f32 = 1e-4;
     if inner < 0.0 || inner > outer + SLACK_RAD || outer <= 0.0 || outer > FRAC_PI_2 + SLACK_RAD {
-        return Err(spot.fault("cone angles with 0 <= inner <= outer <= π/2"));
+        let came = format!("{inner} and {outer}");
+        return Err(Fault::at(spot.pointer(), "cone angles with 0 <= inner <= outer <= π/2", came));
     }
     Ok(cone(inner, outer))
 }

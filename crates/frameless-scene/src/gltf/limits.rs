@@ -60,13 +60,15 @@ pub(super) struct Budget {
     triangles: u64,
     vertices: u64,
     pixels: u64,
+    thin_pixels: u64,
     keyframes: u64,
 }
 
 impl Budget {
     pub(super) fn new(limits: &Limits) -> Budget {
         let limits = limits.clone();
-        Budget { limits, bytes: 0, triangles: 0, vertices: 0, pixels: 0, keyframes: 0 }
+        let (bytes, triangles, vertices, keyframes) = (0, 0, 0, 0);
+        Budget { limits, bytes, triangles, vertices, pixels: 0, thin_pixels: 0, keyframes }
     }
 
     /// `count` things of `each` bytes are about to be allocated for what stands at `pointer`.
@@ -94,15 +96,24 @@ impl Budget {
         spend(&mut self.keyframes, count as u64, self.limits.keyframes, "keyframes", pointer)
     }
 
-    /// An image of `width · height` texels is about to be decoded.
+    /// An image of `width · height` texels is about to be decoded from so many bytes.
     pub(super) fn add_image(
         &mut self,
         pointer: &str,
         width: u32,
         height: u32,
+        encoded_bytes: usize,
     ) -> Result<(), Fault> {
+        /// Drawings of a few flat colours have 10 to 50, a single colour a thousand.
+        const PIXELS_PER_BYTE: u64 = 64;
+        /// Of all texels, those that may come from next to nothing: by default 62 million, a second's work and 400 MB. A file of
+        /// a few kilobytes could take as much as the largest scenes otherwise.
+        const THIN_SHARE: u64 = 8;
         let pixels = u64::from(width) * u64::from(height);
         within(pixels, self.limits.image_pixels, "pixels in one image", pointer)?;
+        let thin = pixels.saturating_sub(PIXELS_PER_BYTE.saturating_mul(encoded_bytes as u64));
+        let thin_limit = self.limits.total_pixels / THIN_SHARE;
+        spend(&mut self.thin_pixels, thin, thin_limit, "pixels in images of few bytes", pointer)?;
         spend(&mut self.pixels, pixels, self.limits.total_pixels, "pixels in all images", pointer)?;
         let limit = self.limits.decoded_bytes;
         spend(&mut self.bytes, image_bytes(pixels), limit, "decoded bytes", pointer)
@@ -173,9 +184,21 @@ mod tests {
     fn one_image_and_all_images_are_limited() {
         let limits = Limits { image_pixels: 10, total_pixels: 15, ..Limits::default() };
         let mut budget = Budget::new(&limits);
-        assert!(budget.add_image("/images/0", 11, 1).is_err());
-        assert!(budget.add_image("/images/0", 5, 2).is_ok());
-        assert!(budget.add_image("/images/1", 3, 2).is_err());
-        assert!(budget.add_image("/images/1", u32::MAX, u32::MAX).is_err());
+        assert!(budget.add_image("/images/0", 11, 1, 99).is_err());
+        assert!(budget.add_image("/images/0", 5, 2, 99).is_ok());
+        assert!(budget.add_image("/images/1", 3, 2, 99).is_err());
+        assert!(budget.add_image("/images/1", u32::MAX, u32::MAX, 99).is_err());
+    }
+
+    #[test]
+    fn images_of_few_bytes_are_limited_together() {
+        let mut budget = Budget::new(&Limits::default());
+        let mut add = |bytes| budget.add_image("/images/0", 4096, 4096, bytes);
+        for _ in 0..3 {
+            assert!(add(20_000).is_ok());
+        }
+        assert!(add(20_000).is_err());
+        // Whoever has data for it may have more.
+        assert!(add(1 << 20).is_ok());
     }
 }

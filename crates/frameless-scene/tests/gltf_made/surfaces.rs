@@ -223,13 +223,32 @@ fn an_image_that_cannot_be_read_is_a_checker() {
 
 #[test]
 fn an_image_of_few_bytes_cannot_fill_memory() {
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    let flat = image::GrayImage::new(9000, 8000);
-    flat.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
-    let maker = with_image(&bytes.into_inner());
-    let scene = load_bytes("i.glb", &maker.glb(), None, &Limits::default()).unwrap();
-    assert_eq!((scene.images[0].width, scene.images[0].height), (8, 8));
-    assert!(warns(&scene, "9000 × 8000"), "{:?}", scene.warnings);
+    let load = |width, height| {
+        let maker = with_image(&flat_png(width, height));
+        load_bytes("i.glb", &maker.glb(), None, &Limits::default()).unwrap()
+    };
+    // Sixteen times as many pixels as limits by default allow for so few bytes, and just more than that.
+    for (width, height, reason) in [
+        (20_000, 20_000, "400000000 pixels in one image"),
+        (9000, 8000, "pixels in images of few bytes, more than the limit of 62500000"),
+    ] {
+        let scene = load(width, height);
+        assert_eq!((scene.images[0].width, scene.images[0].height), (8, 8));
+        assert!(warns(&scene, reason), "{reason}: {:?}", scene.warnings);
+    }
+    assert_eq!(load(3000, 2000).images[0].width, 3000);
+}
+
+/// A grey picture, all of one colour.
+fn flat_png(width: u32, height: u32) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::One);
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_image_data(&vec![0; (width.div_ceil(8) * height) as usize]).unwrap();
+    writer.finish().unwrap();
+    bytes
 }
 
 #[test]
