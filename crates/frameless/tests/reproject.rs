@@ -3,7 +3,7 @@
 mod world;
 
 use frameless::{
-    AdaptiveOptions, AdaptiveStage, ReconstructionKind, ReprojectOptions, ReprojectStage,
+    AdaptiveOptions, AdaptiveStage, ReconstructionKind, ReprojectOptions, ReprojectStage, Rng,
     SamplerKind, Time, Weights,
 };
 use world::*;
@@ -92,6 +92,43 @@ fn colours_without_surfaces_stay_where_they_are_among_those_with() {
         let mut engine = engine(world, kind, 83_000.0);
         let (picture, secs) = play(&mut engine, 40);
         assert_eq!(differences(&picture, &world.ideal(secs)), (0, 0.0), "{kind:?}");
+    }
+}
+
+#[test]
+fn colours_without_surfaces_mix_with_those_that_move() {
+    // Who does not tell its surface stays where it is while the others move on; at rest nothing is left of either.
+    let stopping: Camera = |secs| translating(secs.min(0.4));
+    for kind in [ReconstructionKind::REPROJECT, DEEP] {
+        let errors = [|_| true, (|batch| batch % 8 != 0) as fn(u32) -> bool].map(|surfaces| {
+            let world = World { surfaces, ..world(stopping, |_| [48.0, 36.0, 20.0]) };
+            let mut engine = engine(world, kind, 83_000.0);
+            let (picture, secs) = play(&mut engine, 24);
+            let moving = rmse(&picture, &world.ideal(secs));
+            let (picture, secs) = play(&mut engine, 40);
+            assert_eq!(differences(&picture, &world.ideal(secs)), (0, 0.0), "{kind:?}");
+            moving
+        });
+        let [told, untold] = errors;
+        assert!(untold < 4.0 * told, "{kind:?}: {untold} where an eighth is not told, else {told}");
+    }
+}
+
+#[test]
+fn where_everything_changes_everybody_is_looked_at_alike() {
+    // Each pixel flickers by itself, a hundred times a second: nothing can be followed, foreseen or learned.
+    let flicker = |secs: f64, [x, y]: [f32; 2]| {
+        let place = (x.floor() as u64) << 32 | (y.floor() as u64) << 16;
+        0.2 + 0.8 * Rng::new(place | (100.0 * secs) as u64).unit_f32()
+    };
+    let rate = 83_000.0;
+    for kind in KINDS {
+        let world = World { light: flicker, ..world(STILL, NO_DISC) };
+        let mut engine = engine(world, kind, rate);
+        let (_, secs) = play(&mut engine, 60);
+        let ages = engine.canvas().time().map(|time| Time::from_secs(secs).secs_since(time));
+        let passes = ages.fold(0.0, f64::max) * rate / SIZE.pixels() as f64;
+        assert!(passes < 2.0, "{kind:?}: the oldest pixel has waited for {passes} passes");
     }
 }
 

@@ -18,7 +18,7 @@
 
 use std::ops::Range;
 
-use super::holes::{Hole, Waiting};
+use super::holes::Waiting;
 use super::store::{EMPTY, SCREEN, Sample, Store, Tick};
 use crate::wide::{self, F8, M8, Unit};
 use crate::{Size, bayer};
@@ -119,7 +119,7 @@ impl Covers {
                     let (x, y) = (x0 + dx + x, y0 + dy + y);
                     let is_old = |cell: usize| begun.is_later_than(store.tick(cell));
                     if x < size.width && y < size.height && store.newest(x, y).is_some_and(is_old) {
-                        waiting.push(Hole::Large, &[size.index(x, y)]);
+                        waiting.doubt(size.index(x, y));
                     }
                 }
             }
@@ -296,6 +296,7 @@ fn take_away(store: &mut Store, [x0, y0]: [u32; 2], begun: Tick, limit: f32) {
 mod tests {
     use super::super::store::{Lit, Record, Surfel};
     use super::*;
+    use crate::tile::TileGrid;
 
     const SIZE: Size = Size { width: 64, height: 48 };
 
@@ -368,7 +369,7 @@ mod tests {
         let probed = |covers: &Covers, store: &Store| {
             let (mut waiting, mut ordered) = (Waiting::default(), Vec::new());
             covers.probe(store, &mut waiting);
-            waiting.order(SIZE.width, &mut ordered);
+            waiting.order(&TileGrid::new(SIZE, 8), &[0.01; 48], &mut ordered);
             ordered
         };
         assert_eq!(probed(&covers, &store), [], "nothing is suspect");

@@ -79,7 +79,7 @@ struct Found {
     /// Scratch memory.
     rows: Rows,
     row: TileRow,
-    lines: [Line; 3],
+    lines: [Line; 2],
 }
 
 /// Pixels of a row, with room for eight more than there can be.
@@ -357,9 +357,7 @@ struct Eight<U: Unit> {
 struct AroundHoles<U: Unit> {
     /// The object of the sample nearest to the centre; [`EMPTY`] where there is none.
     object: M8<U>,
-    /// How many pixels beside it have samples, negative.
-    count: M8<U>,
-    /// Whether any has.
+    /// Whether any pixel beside it has samples.
     any: M8<U>,
     /// To the first of them in the order of [`AROUND`], in pixels.
     offset: M8<U>,
@@ -473,9 +471,8 @@ impl<F: Fn(u32) -> bool> Blocks<'_, F> {
                 let before = if y % TILE == 0 { oldest } else { *calm };
                 *calm = before.zip(oldest).map(|(a, b)| if a.is_later_than(b) { b } else { a });
             }
-            let Found { waiting, far, lines: [large, small, others], .. } = &mut *self.found;
-            waiting.push(Hole::Large, large.take());
-            waiting.push(Hole::Small, small.take());
+            let Found { waiting, far, lines: [unknown, others], .. } = &mut *self.found;
+            waiting.push(Hole::Unknown, unknown.take());
             far.extend_from_slice(others.take());
         }
     }
@@ -539,7 +536,7 @@ impl<F: Fn(u32) -> bool> Blocks<'_, F> {
         marks.store(&mut self.shown.marks[tile as usize].0, (eight.y % TILE * TILE) as usize);
     }
 
-    /// Holes wait to be traced: those that can be guessed well, and those that cannot. Returns whose samples `pixels` show.
+    /// Holes wait to be traced. Returns whose samples `pixels` show.
     #[inline(always)]
     fn note_holes<U: Unit>(
         &mut self,
@@ -547,12 +544,9 @@ impl<F: Fn(u32) -> bool> Blocks<'_, F> {
         holes: M8<U>,
         around: &AroundHoles<U>,
     ) -> M8<U> {
-        // A mask is −1 where it is set.
-        let large = M8::splat(-4i32 as u32).less_than(around.count).and(holes).bits();
         let far = around.any.not().and(holes);
-        let [to_large, to_small, to_far] = &mut self.found.lines;
-        to_large.push(pixels, large);
-        to_small.push(pixels, holes.bits() & !large);
+        let [to_unknown, to_far] = &mut self.found.lines;
+        to_unknown.push(pixels, holes.bits());
         if far.any() {
             to_far.push(pixels, far.bits());
         }
@@ -640,8 +634,7 @@ impl Near<'_> {
             return AroundHoles { object: self.nearest(eight), ..self.beside(eight) };
         }
         let (none, empty) = (M8::splat(0), M8::splat(EMPTY));
-        let mut found =
-            AroundHoles { object: empty, count: none, any: none, offset: none, tick: none };
+        let mut found = AroundHoles { object: empty, any: none, offset: none, tick: none };
         let (mut least, mut first) = (F8::splat(f32::INFINITY), M8::splat(AROUND.len() as u32));
         let around = self.samples.around(eight.first, &self.cells.around);
         for (k, &(nth, to_pixel)) in self.cells.beside.iter().enumerate() {
@@ -652,7 +645,6 @@ impl Near<'_> {
             let [x, y, object, tick, ..] = around.load(k);
             let object = object.to_bits();
             let is_sample = object.equals(empty).not();
-            found.count = found.count.plus(is_sample);
             let distance2 = distance2([x, y], &eight.centre);
             let nearer = distance2.less_than(least).and(is_sample);
             least = distance2.or(nearer, least);
@@ -710,7 +702,7 @@ impl Near<'_> {
     #[inline(always)]
     fn beside<U: Unit>(&self, eight: &Eight<U>) -> AroundHoles<U> {
         let (none, object) = (M8::splat(0), M8::splat(EMPTY));
-        let mut beside = AroundHoles { object, count: none, any: none, offset: none, tick: none };
+        let mut beside = AroundHoles { object, any: none, offset: none, tick: none };
         let cells = self.samples.around(eight.first, &self.cells.pixels);
         let subs = cells.len() / AROUND.len();
         for (nth, &offset) in self.cells.to_pixels.iter().enumerate() {
@@ -719,8 +711,6 @@ impl Near<'_> {
             beside.offset = beside.offset.either(is_first.and(M8::splat(offset)));
             beside.tick = beside.tick.either(is_first.and(newest));
             beside.any = beside.any.either(is_known);
-            // A mask is −1 where it is set.
-            beside.count = beside.count.plus(is_known);
         }
         beside
     }

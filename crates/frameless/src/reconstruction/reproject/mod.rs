@@ -310,8 +310,8 @@ impl Reproject {
         }
         if self.shown.len() != size.pixels() {
             self.shown = canvas.rgb().iter().map(|&rgb| refresh.display.encode(rgb)).collect();
+            tile_contrast(&self.shown, &rates.grid, &mut self.contrast);
         }
-        tile_contrast(&self.shown, &rates.grid, &mut self.contrast);
         let mut marks = canvas.lend();
         let recentres = self.options.without != Some(ReprojectStage::Recentre);
         let rests = |object| self.settled.rests(object);
@@ -335,7 +335,9 @@ impl Reproject {
         if refresh.is_noisy && self.options.without != Some(ReprojectStage::Borrow) {
             self.settled.borrow(&self.store, refresh, &mut self.shown);
         }
-        self.gather.waiting.order(size.width, &mut self.holes);
+        let grid = TileGrid::new(size, touched::TILE);
+        tile_contrast(&self.shown, &grid, &mut self.contrast);
+        self.gather.waiting.order(&grid, &self.contrast, &mut self.holes);
         canvas.update(refresh.now, &mut self.holes, &mut marks);
         picture.clone_from(&self.shown);
     }
