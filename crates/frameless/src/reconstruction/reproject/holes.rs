@@ -43,8 +43,7 @@ pub(super) struct Waiting {
     doubted: Vec<u32>,
     /// Bayer's order of 32×32 pixels, row by row.
     rank: [u16; RANKS],
-    /// Scratch memory: pixels of a kind by rank, their classes, and per tile how much is known.
-    ranked: Vec<u32>,
+    /// Scratch memory: pixels' classes, and per tile how much is known.
     classes: Vec<u8>,
     known: Vec<u32>,
 }
@@ -57,7 +56,6 @@ impl Default for Waiting {
             found: Default::default(),
             doubted: Vec::new(),
             rank: std::array::from_fn(rank),
-            ranked: Vec::new(),
             classes: Vec::new(),
             known: Vec::new(),
         }
@@ -94,24 +92,24 @@ impl Waiting {
         }
     }
 
-    /// The most urgent first. `contrast`: of the tiles of `grid`.
+    /// The most urgent first; none of them waits here any more. `contrast`: of the tiles of `grid`.
     pub(super) fn order(&mut self, grid: &TileGrid, contrast: &[f32], ordered: &mut Vec<u32>) {
-        let mut ranked = std::mem::take(&mut self.ranked);
-        ranked.clear();
-        self.by_rank(Hole::Unknown, grid.size.width, &mut ranked);
-        self.classify(grid, contrast, &ranked);
+        ordered.clear();
+        self.by_rank(Hole::Unknown, grid.size.width, ordered);
+        self.classify(grid, contrast, ordered);
         let mut next = [0; CLASSES];
         self.classes.iter().for_each(|&class| next[usize::from(class)] += 1);
         add_up(&mut next);
-        ordered.clear();
-        ordered.resize(ranked.len(), 0);
-        for (&pixel, &class) in ranked.iter().zip(&self.classes) {
+        // There is room for them where they were found.
+        let by_class = &mut self.found[Hole::Unknown as usize];
+        for (&pixel, &class) in ordered.iter().zip(&self.classes) {
             let next = &mut next[usize::from(class)];
-            ordered[*next] = pixel;
+            by_class[*next] = pixel;
             *next += 1;
         }
-        self.ranked = ranked;
+        std::mem::swap(ordered, by_class);
         self.by_rank(Hole::OffCentre, grid.size.width, ordered);
+        self.clear();
     }
 
     /// The classes of pixels that are traced one after the other.
