@@ -130,12 +130,7 @@ impl Subject {
     ) -> (Vec<[f32; 3]>, Vec<Surface>) {
         let view = self.view(moment.state(), secs);
         let settings = Settings { surfaces, ..Settings::default() };
-        let trace = |request: &Request| self.world.trace(moment, &view, size, request, &settings);
-        if surfaces {
-            requests.iter().map(trace).unzip()
-        } else {
-            (requests.iter().map(|request| trace(request).0).collect(), Vec::new())
-        }
+        self.world.trace_all(moment, &view, size, requests, &settings)
     }
 
     fn view(&self, state: &State, secs: f64) -> View {

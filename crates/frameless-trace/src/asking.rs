@@ -2,18 +2,20 @@
 
 use std::f32::consts::FRAC_1_PI;
 
+use frameless::Light;
 use glam::Vec3A;
 
 use crate::direct::Probe;
 use crate::integrator::Settings;
 use crate::moment::Moment;
+use crate::packet::TOGETHER;
 use crate::point::Point;
 use crate::ray::Ray;
 use crate::traverse::Stack;
 use crate::world::World;
 
 /// The answer of all lights.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Asked {
     /// Σ E cosθ V / π.
     pub(crate) all: Vec3A,
@@ -35,10 +37,59 @@ pub(crate) struct Arriving {
 }
 
 impl Arriving {
+    /// Before anything is known of what stands in between; `None` where a light gives nothing that anybody asks for.
+    #[inline(always)]
+    fn at(point: &Point, light: &Light, settings: &Settings) -> Option<Arriving> {
+        let arriving = light.at(point.position.to_array());
+        let to_light = Vec3A::from(arriving.direction);
+        let irradiance = Vec3A::from(arriving.irradiance);
+        let cos = point.normal.dot(to_light);
+        let is_off = irradiance == Vec3A::ZERO;
+        let is_asked = !(cos <= 0.0 || (is_off && !settings.surfaces));
+        is_asked.then_some(Arriving { to_light, irradiance, cos })
+    }
+
+    #[inline(always)]
+    fn shadow_ray(&self, point: &Point, light: &Light) -> Ray {
+        let origin = point.shadow_origin;
+        let direction = match light.position {
+            Some(position) => Vec3A::from(position) - origin,
+            None => self.to_light,
+        };
+        Ray { origin, direction }
+    }
+
     /// What a matte surface sends back of it, per albedo.
     #[inline(always)]
     fn per_albedo(&self) -> Vec3A {
         self.irradiance * (self.cos * FRAC_1_PI)
+    }
+}
+
+/// How far along its shadow rays a light is.
+fn reach(light: &Light) -> f32 {
+    if light.position.is_some() { 1.0 } else { f32::INFINITY }
+}
+
+impl Asked {
+    /// Before any light is asked.
+    pub(crate) const NOBODY: Asked =
+        Asked { all: Vec3A::ZERO, unhindered: Vec3A::ZERO, lit: u32::MAX };
+
+    /// A light's answer, of which this part passes; returns what arrives, if anything does.
+    #[inline(always)]
+    fn add(&mut self, index: usize, arriving: Arriving, passes: Vec3A) -> Option<Arriving> {
+        let arriving = Arriving { irradiance: passes * arriving.irradiance, ..arriving };
+        let arrives = passes != Vec3A::ZERO;
+        if arrives {
+            self.all += arriving.per_albedo();
+        }
+        if passes == Vec3A::ONE {
+            self.unhindered += arriving.per_albedo();
+        } else if index < 32 {
+            self.lit &= !(1 << index);
+        }
+        arrives.then_some(arriving)
     }
 }
 
@@ -54,36 +105,55 @@ impl World {
         probe: &mut impl Probe,
         mut take: impl FnMut(Arriving),
     ) -> Asked {
-        let mut asked = Asked { lit: u32::MAX, ..Asked::default() };
+        let mut asked = Asked::NOBODY;
         for (index, light) in moment.lights.iter().enumerate() {
-            let arriving = light.at(point.position.to_array());
-            let to_light = Vec3A::from(arriving.direction);
-            let irradiance = Vec3A::from(arriving.irradiance);
-            let cos = point.normal.dot(to_light);
-            let is_off = irradiance == Vec3A::ZERO;
-            if cos <= 0.0 || (is_off && !settings.surfaces) {
+            let Some(arriving) = Arriving::at(point, light, settings) else {
                 probe.note(|| format!("  light {index}: faces away or gives nothing"));
                 continue;
-            }
-            let (direction, t_max) = match light.position {
-                Some(position) => (Vec3A::from(position) - point.shadow_origin, 1.0),
-                None => (to_light, f32::INFINITY),
             };
-            let shadow_ray = Ray { origin: point.shadow_origin, direction };
-            let passes = self.passing(moment, &shadow_ray, t_max, true, stack);
-            let arriving = Arriving { to_light, irradiance: passes * irradiance, cos };
+            let shadow_ray = arriving.shadow_ray(point, light);
+            let passes = self.passing(moment, &shadow_ray, reach(light), true, stack);
+            let arrived = asked.add(index, arriving, passes);
             probe.note(|| {
-                let contribution = arriving.per_albedo();
+                let (cos, contribution) = (arriving.cos, arrived.map_or(Vec3A::ZERO, |a| a.per_albedo()));
                 format!("  light {index}: {passes:.3} of it passes: {contribution:.5} per albedo (cos {cos:.4})")
             });
-            if passes != Vec3A::ZERO {
-                asked.all += arriving.per_albedo();
-                take(arriving);
+            if let Some(arrived) = arrived {
+                take(arrived);
             }
-            if passes == Vec3A::ONE {
-                asked.unhindered += arriving.per_albedo();
-            } else if index < 32 {
-                asked.lit &= !(1 << index);
+        }
+        asked
+    }
+
+    /// The sums of [`World::ask_lights`] for at most [`TOGETHER`] points, where there are any; shadow rays of neighbours are walked together.
+    #[inline(always)]
+    pub(crate) fn ask_lights_of(
+        &self,
+        moment: &Moment,
+        points: &[Option<&Point>],
+        settings: &Settings,
+        stack: &mut Stack,
+    ) -> [Asked; TOGETHER] {
+        let mut asked = [Asked::NOBODY; TOGETHER];
+        for (index, light) in moment.lights.iter().enumerate() {
+            let mut arriving = [None; TOGETHER];
+            let (mut rays, mut count) = ([Ray::NONE; TOGETHER], 0);
+            for (arriving, point) in arriving.iter_mut().zip(points) {
+                let Some(point) = point else { continue };
+                *arriving = Arriving::at(point, light, settings);
+                if let Some(arriving) = arriving {
+                    rays[count % TOGETHER] = arriving.shadow_ray(point, light);
+                    count += 1;
+                }
+            }
+            let rays = &rays[..count.min(TOGETHER)];
+            let mut passes = self.passing_of(moment, rays, reach(light), stack).into_iter();
+            for (asked, arriving) in asked.iter_mut().zip(arriving) {
+                if let Some(arriving) = arriving
+                    && let Some(passes) = passes.next()
+                {
+                    asked.add(index, arriving, passes);
+                }
             }
         }
         asked

@@ -19,6 +19,7 @@ use crate::fresnel::refracted;
 use crate::holes::{Chance, attenuation};
 use crate::integrator::Settings;
 use crate::moment::Moment;
+use crate::packet::TOGETHER;
 use crate::point::Point;
 use crate::ray::{Hit, Ray};
 use crate::shares::{Shares, mirror_weight};
@@ -67,91 +68,195 @@ struct Leg {
 
 /// What comes of the rays so far.
 struct Picture {
+    /// The ray that is being followed.
+    leg: Leg,
     radiance: Vec3A,
     first: FirstSurface,
     waiting: Vec<Leg>,
     branches: u32,
 }
 
+/// What a leg has seen.
+enum Seen<'a> {
+    /// All there was to see is added.
+    All {
+        goes_on: bool,
+    },
+    Lit(Lit<'a>),
+}
+
+/// Of a surface that lights may reach.
+struct Lit<'a> {
+    material: &'a Material,
+    shares: Shares,
+    /// Absorption per metre of what the leg was inside on its way.
+    inside: Option<Vec3A>,
+    alpha: f32,
+    /// The part of the light from there that is seen, were it opaque or not.
+    arriving: Vec3A,
+    throughput: Vec3A,
+}
+
 impl World {
-    /// What comes back along a ray.
+    /// What comes back along a ray, which meets `met` first.
     #[inline(always)]
     pub(crate) fn radiance(
         &self,
         moment: &Moment,
-        (ray, cone): (Ray, Cone),
+        (ray, met, cone): (Ray, Option<Hit>, Cone),
         settings: &Settings,
         stack: &mut Stack,
         probe: &mut impl Probe,
     ) -> ([f32; 3], Surface) {
-        let mut picture = Picture {
-            radiance: Vec3A::ZERO,
-            first: FirstSurface::new(settings.surfaces),
-            waiting: Vec::new(),
-            branches: 0,
-        };
-        let throughput = Vec3A::ONE;
-        let (depth, layers, inside, from_camera, culls) = (0, 0, None, true, false);
-        let mut leg = Leg { ray, cone, throughput, depth, layers, inside, from_camera, culls };
-        while self.follow(moment, &mut leg, settings, &mut picture, stack, probe)
-            || picture.take_up(&mut leg)
-        {}
+        let mut picture = Picture::new(ray, cone, settings);
+        let goes_on = self.see(moment, &mut picture, met.as_ref(), settings, stack, probe);
+        self.follow(moment, &mut picture, goes_on, settings, stack, probe);
         (finite(picture.radiance), picture.first.surface(&ray))
     }
 
-    /// Adds what a ray sees, and brings it to where it goes on; returns false if it does not.
+    /// The same of at most [`TOGETHER`] rays, for `take` in their order; what neighbours have in common is done once.
+    #[inline(always)]
+    pub(crate) fn radiances(
+        &self,
+        moment: &Moment,
+        (rays, met, cone): (&[Ray], &[Option<Hit>], Cone),
+        settings: &Settings,
+        stack: &mut Stack,
+        mut take: impl FnMut([f32; 3], Surface),
+    ) {
+        let (mut points, mut facet) = ([const { None }; TOGETHER], None);
+        for ((point, ray), met) in points.iter_mut().zip(rays).zip(met) {
+            let of = |hit| Point::on(self, moment, (ray, hit, cone), &mut facet);
+            *point = met.as_ref().map(of);
+        }
+        let mut lit = [None; TOGETHER];
+        for ((lit, point), met) in lit.iter_mut().zip(&points).zip(met) {
+            let (Some(point), Some(hit)) = (point, met) else { continue };
+            let material = &self.scene().materials[point.material as usize];
+            *lit = (!material.unlit && !self.is_culled(hit, point)).then_some(point);
+        }
+        let asked = self.ask_lights_of(moment, &lit[..rays.len()], settings, stack);
+        let probe = &mut NoProbe;
+        for (((point, &ray), met), asked) in points.iter().zip(rays).zip(met).zip(&asked) {
+            let picture = &mut Picture::new(ray, cone, settings);
+            let goes_on = if let (Some(point), Some(hit)) = (point, met) {
+                let met = (hit, point);
+                match self.meet(picture, met, settings, probe) {
+                    Seen::All { goes_on } => goes_on,
+                    Seen::Lit(lit) => {
+                        self.leave(moment, picture, met, (&lit, asked), settings, probe)
+                    }
+                }
+            } else {
+                self.see_sky(picture, probe)
+            };
+            self.follow(moment, picture, goes_on, settings, stack, probe);
+            take(finite(picture.radiance), picture.first.surface(&ray));
+        }
+    }
+
+    /// Adds what is seen along the leg at hand, if it goes on, and along those that wait.
     #[inline(always)]
     fn follow(
         &self,
         moment: &Moment,
-        leg: &mut Leg,
-        settings: &Settings,
         picture: &mut Picture,
+        mut goes_on: bool,
+        settings: &Settings,
+        stack: &mut Stack,
+        probe: &mut impl Probe,
+    ) {
+        while goes_on || picture.take_up() {
+            let Leg { ray, culls, .. } = picture.leg;
+            let met = match culls {
+                false => self.nearest(moment, &ray, || Chance::Never, stack),
+                true => self.behind_back(moment, &ray, || Chance::Never, stack),
+            };
+            goes_on = self.see(moment, picture, met.as_ref(), settings, stack, probe);
+        }
+    }
+
+    /// Adds what a leg sees, which ends at `met`, and brings it to where it goes on; returns false if it does not.
+    #[inline(always)]
+    fn see(
+        &self,
+        moment: &Moment,
+        picture: &mut Picture,
+        met: Option<&Hit>,
+        settings: &Settings,
         stack: &mut Stack,
         probe: &mut impl Probe,
     ) -> bool {
-        let (ray, depth) = (leg.ray, leg.depth);
+        let Leg { ray, cone, depth, .. } = picture.leg;
         probe.note(|| format!("ray {depth}: from {:.5} along {:.5}", ray.origin, ray.direction));
-        let found = match leg.culls {
-            false => self.nearest(moment, &ray, || Chance::Never, stack),
-            true => self.behind_back(moment, &ray, || Chance::Never, stack),
-        };
-        let Some(hit) = found else {
-            self.see_sky(leg, picture, probe);
-            return false;
-        };
+        let Some(hit) = met else { return self.see_sky(picture, probe) };
         probe.note(|| format!("  {hit:?}"));
-        let point = Point::new(self, moment, &ray, &hit, leg.cone);
-        if leg.from_camera && !leg.culls && self.is_culled(&hit, &point) {
+        let point = &Point::new(self, moment, &ray, hit, cone);
+        let met = (hit, point);
+        match self.meet(picture, met, settings, probe) {
+            Seen::All { goes_on } => goes_on,
+            Seen::Lit(lit) => {
+                let asked = self.ask_lights(moment, point, settings, stack, probe, |_| ());
+                self.leave(moment, picture, met, (&lit, &asked), settings, probe)
+            }
+        }
+    }
+
+    /// Adds what a leg sees of the point that it has met, if that needs no light. Else it is for [`World::leave`].
+    #[inline(always)]
+    fn meet<'a>(
+        &'a self,
+        picture: &mut Picture,
+        (hit, point): (&Hit, &Point),
+        settings: &Settings,
+        probe: &mut impl Probe,
+    ) -> Seen<'a> {
+        let leg = &mut picture.leg;
+        let depth = leg.depth;
+        if leg.from_camera && !leg.culls && self.is_culled(hit, point) {
             probe.note(|| "  the back of what is single-sided, which the camera passes".to_owned());
             leg.culls = true;
-            return true;
+            return Seen::All { goes_on: true };
         }
         let material = &self.scene().materials[point.material as usize];
-        let matter = &point.matter;
-        let way_m = || hit.t * ray.direction.length();
         let inside = leg.inside.or_else(|| point.behind(material));
         let arriving = match inside {
             None => leg.throughput,
-            Some(sigma) => leg.throughput * attenuation(sigma, way_m()),
+            Some(sigma) => leg.throughput * attenuation(sigma, leg.way_m(hit)),
         };
-        let alpha = if leg.layers < MOST_LAYERS { matter.alpha } else { 1.0 };
+        let alpha = if leg.layers < MOST_LAYERS { point.matter.alpha } else { 1.0 };
         let throughput = alpha * arriving;
+        if material.unlit {
+            let gives = throughput * point.matter.base;
+            probe.note(|| format!("  unlit, throughput {throughput:.5}: adds {gives:.6}"));
+            leg.throughput = (1.0 - alpha) * arriving;
+            let goes_on = leg.throughput != Vec3A::ZERO && leg.go_through(point, leg.way_m(hit));
+            picture.radiance += gives;
+            picture.see(self, alpha, || point.unlit(hit), throughput);
+            return Seen::All { goes_on };
+        }
+        let shares = Shares::of(point, -leg.ray.direction, depth < settings.max_depth);
+        probe.note(|| describe(point, material, &shares));
+        Seen::Lit(Lit { material, shares, inside, alpha, arriving, throughput })
+    }
+
+    /// Adds what a surface that lights may reach shows, and brings the leg to where it goes on; returns false if it does not.
+    #[inline(always)]
+    fn leave(
+        &self,
+        moment: &Moment,
+        picture: &mut Picture,
+        (hit, point): (&Hit, &Point),
+        (lit, asked): (&Lit<'_>, &Asked),
+        settings: &Settings,
+        probe: &mut impl Probe,
+    ) -> bool {
+        let &Lit { material, ref shares, inside, alpha, arriving, throughput } = lit;
+        let Leg { ray, depth, layers, .. } = picture.leg;
         // Of what is seen behind a veil or through glass, only this part belongs to the surface.
         let veil = if depth == 0 { throughput } else { Vec3A::ONE };
-        if material.unlit {
-            let gives = throughput * matter.base;
-            probe.note(|| format!("  unlit, throughput {throughput:.5}: adds {gives:.6}"));
-            picture.radiance += gives;
-            picture.see(self, alpha, || point.unlit(&hit), throughput);
-            leg.throughput = (1.0 - alpha) * arriving;
-            return leg.throughput != Vec3A::ZERO && leg.go_through(&point, way_m());
-        }
-        let shares = Shares::of(&point, -ray.direction, depth < settings.max_depth);
-        probe.note(|| describe(&point, material, &shares));
-        let asked = self.direct_light(moment, &point, settings, stack, probe);
-        let emissive = matter.emissive;
-        let ambient = matter.occlusion * self.ambient(point.normal);
+        let emissive = point.matter.emissive;
+        let ambient = point.matter.occlusion * self.ambient(point.normal);
         let gives = throughput * (emissive + shares.matte * (ambient + asked.all));
         probe.note(|| format!("  ambient {ambient:.5} per albedo; emits {emissive:.5}"));
         probe.note(|| {
@@ -159,47 +264,44 @@ impl World {
             format!("  albedo {albedo:.5}, throughput {throughput:.5}: adds {gives:.6}")
         });
         picture.radiance += gives;
-        let seen = || point.surface(&hit, veil * shares.matte, asked.unhindered, asked.lit);
+        let seen = || point.surface(hit, veil * shares.matte, asked.unhindered, asked.lit);
         picture.see(self, alpha, seen, throughput);
-        if depth == 0 && leg.layers == 0 && settings.surfaces {
-            picture.first.look_into_mirror(self, moment, &hit, ray.direction);
+        if depth == 0 && layers == 0 && settings.surfaces {
+            picture.first.look_into_mirror(self, moment, hit, ray.direction);
         }
         let mirrored = throughput * shares.mirrored;
         if alpha < 1.0 || shares.passed != Vec3A::ZERO {
             let behind = (1.0 - alpha) * arriving;
             let ways = [behind, throughput * shares.passed, mirrored];
-            return picture.branch(leg, (&point, material), ways, inside, way_m());
+            return picture.branch((hit, point, material), ways, inside);
         }
+        let leg = &mut picture.leg;
         leg.throughput = mirrored;
-        mirrored != Vec3A::ZERO && leg.go_back(&point, inside, way_m())
+        mirrored != Vec3A::ZERO && leg.go_back(point, inside, leg.way_m(hit))
     }
 
-    fn see_sky(&self, leg: &Leg, picture: &mut Picture, probe: &mut impl Probe) {
-        let throughput = leg.throughput;
-        let sky = self.sky(leg.ray.direction);
+    /// Adds what is far away, where a leg ends.
+    #[inline(always)]
+    fn see_sky(&self, picture: &mut Picture, probe: &mut impl Probe) -> bool {
+        let Leg { ray, throughput, .. } = picture.leg;
+        let sky = self.sky(ray.direction);
         let gives = throughput * sky;
         probe.note(|| {
             format!("  nothing hit: sky {sky:.5}, throughput {throughput:.5}: adds {gives:.6}")
         });
         picture.radiance += gives;
-        picture.see(self, 1.0, || sky_surface(&leg.ray), throughput);
-    }
-
-    /// Σ E cosθ V / π over the lights.
-    #[inline]
-    fn direct_light(
-        &self,
-        moment: &Moment,
-        point: &Point,
-        settings: &Settings,
-        stack: &mut Stack,
-        probe: &mut impl Probe,
-    ) -> Asked {
-        self.ask_lights(moment, point, settings, stack, probe, |_| ())
+        picture.see(self, 1.0, || sky_surface(&ray), throughput);
+        false
     }
 }
 
 impl Picture {
+    #[inline(always)]
+    fn new(ray: Ray, cone: Cone, settings: &Settings) -> Picture {
+        let (leg, first) = (Leg::from_camera(ray, cone), FirstSurface::new(settings.surfaces));
+        Picture { leg, radiance: Vec3A::ZERO, first, waiting: Vec::new(), branches: 0 }
+    }
+
     /// Told of every surface. A veil of which less than half is there leaves the sample to what is behind.
     #[inline(always)]
     fn see(&mut self, world: &World, alpha: f32, seen: impl FnOnce() -> Surface, part: Vec3A) {
@@ -213,14 +315,13 @@ impl Picture {
     #[inline(never)]
     fn branch(
         &mut self,
-        leg: &mut Leg,
-        (point, material): (&Point, &Material),
+        (hit, point, material): (&Hit, &Point, &Material),
         [behind, passed, mirrored]: [Vec3A; 3],
         inside: Option<Vec3A>,
-        way_m: f32,
     ) -> bool {
+        let (leg, way_m) = (self.leg, self.leg.way_m(hit));
         let with = |throughput: Vec3A, go: &dyn Fn(&mut Leg) -> bool| {
-            let mut way = Leg { throughput, ..*leg };
+            let mut way = Leg { throughput, ..leg };
             (throughput != Vec3A::ZERO && go(&mut way)).then_some(way)
         };
         let behind = with(behind, &|leg| leg.go_through(point, way_m));
@@ -235,17 +336,17 @@ impl Picture {
                 self.waiting.push(later);
             }
         }
-        *leg = next;
+        self.leg = next;
         true
     }
 
-    /// Whether there is another way to be followed, which is then `leg`.
+    /// Whether there is another way to be followed, which is then the leg at hand.
     #[inline(always)]
-    fn take_up(&mut self, leg: &mut Leg) -> bool {
+    fn take_up(&mut self) -> bool {
         match self.waiting.pop() {
             None => false,
             Some(waiting) => {
-                *leg = waiting;
+                self.leg = waiting;
                 true
             }
         }
@@ -253,6 +354,18 @@ impl Picture {
 }
 
 impl Leg {
+    #[inline(always)]
+    fn from_camera(ray: Ray, cone: Cone) -> Leg {
+        let (throughput, from_camera, culls) = (Vec3A::ONE, true, false);
+        Leg { ray, cone, throughput, depth: 0, layers: 0, inside: None, from_camera, culls }
+    }
+
+    /// To where it hits.
+    #[inline(always)]
+    fn way_m(&self, hit: &Hit) -> f32 {
+        hit.t * self.ray.direction.length()
+    }
+
     /// Straight on, behind a surface that blends.
     fn go_through(&mut self, point: &Point, way_m: f32) -> bool {
         self.ray.origin = point.inside();

@@ -55,7 +55,7 @@ impl FirstSurface {
 
     /// What was found; a path that met nothing saw the sky along its last ray.
     #[inline(always)]
-    pub(crate) fn surface(self, last: &Ray) -> Surface {
+    pub(crate) fn surface(&self, last: &Ray) -> Surface {
         if !self.is_asked_for {
             return Surface::default();
         }

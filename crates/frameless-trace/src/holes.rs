@@ -10,9 +10,11 @@ use crate::fresnel::Dielectric;
 use crate::matter::{Matter, coverage};
 use crate::moment::Moment;
 use crate::numbers::{self, mixed};
+use crate::packet::TOGETHER;
 use crate::point::{Placement, Point};
 use crate::ray::{Hit, Ray};
 use crate::sift::Sieve;
+use crate::top::{Occluded, Targets};
 use crate::traverse::Stack;
 use crate::world::World;
 
@@ -61,6 +63,33 @@ impl World {
         moment.targets(self).closest(ray, stack)
     }
 
+    /// What [`World::nearest`] says of each of a few rays; neighbours are walked together. `chance`: of the ray with that index.
+    #[inline(always)]
+    pub(crate) fn nearest_of(
+        &self,
+        moment: &Moment,
+        rays: &[Ray],
+        chance: impl Fn(usize) -> Chance,
+        found: &mut [Option<Hit>],
+        stack: &mut Stack,
+    ) {
+        moment.targets(self).closest_of(rays, found, stack);
+        if !self.has_holes {
+            return;
+        }
+        for (index, (ray, found)) in rays.iter().zip(found).enumerate() {
+            // What is nearest of all is so of what is there, if it is there.
+            if let Some(hit) = found
+                && moment.placed(hit.instance).has_holes
+            {
+                let (chance, culls) = (chance(index), false);
+                if !(Holes { world: self, moment, ray, chance, culls }).stops(hit) {
+                    *found = self.nearest_through(moment, ray, (chance, culls), stack);
+                }
+            }
+        }
+    }
+
     /// Whether the camera does not see what it has hit, but what is [behind](World::behind_back).
     #[inline(always)]
     pub(crate) fn is_culled(&self, hit: &Hit, point: &Point) -> bool {
@@ -101,10 +130,49 @@ impl World {
         through_glass: bool,
         stack: &mut Stack,
     ) -> Vec3A {
-        if self.has_holes {
-            return self.passing_holes(moment, ray, t_max, through_glass, stack);
+        self.passing_targets(moment, &moment.targets(self), (ray, t_max), through_glass, stack)
+    }
+
+    /// What [`World::passing`] says of each of at most [`TOGETHER`] rays, through glass; neighbours are walked together.
+    #[inline(always)]
+    pub(crate) fn passing_of(
+        &self,
+        moment: &Moment,
+        rays: &[Ray],
+        t_max: f32,
+        stack: &mut Stack,
+    ) -> [Vec3A; TOGETHER] {
+        let all = moment.targets(self);
+        let Occluded { blocked, passed, is_all } = all.occluded_of(rays, t_max, stack);
+        let rest = Targets { standing: None, ..all };
+        let mut passes = [Vec3A::ZERO; TOGETHER];
+        for (index, (ray, passes)) in rays.iter().zip(&mut passes).enumerate() {
+            let has = |rays: u32| rays >> index & 1 != 0;
+            if has(blocked) {
+                continue;
+            }
+            *passes = match has(passed) {
+                true if is_all => Vec3A::ONE,
+                true => self.passing_targets(moment, &rest, (ray, t_max), true, stack),
+                false => self.passing_targets(moment, &all, (ray, t_max), true, stack),
+            };
         }
-        let is_shaded = moment.targets(self).occluded(ray, t_max, stack);
+        passes
+    }
+
+    #[inline(always)]
+    fn passing_targets(
+        &self,
+        moment: &Moment,
+        targets: &Targets<'_>,
+        (ray, t_max): (&Ray, f32),
+        through_glass: bool,
+        stack: &mut Stack,
+    ) -> Vec3A {
+        if self.has_holes {
+            return self.passing_holes(moment, targets, (ray, t_max), through_glass, stack);
+        }
+        let is_shaded = targets.occluded(ray, t_max, stack);
         if is_shaded { Vec3A::ZERO } else { Vec3A::ONE }
     }
 
@@ -112,12 +180,11 @@ impl World {
     fn passing_holes(
         &self,
         moment: &Moment,
-        ray: &Ray,
-        t_max: f32,
+        targets: &Targets<'_>,
+        (ray, t_max): (&Ray, f32),
         through_glass: bool,
         stack: &mut Stack,
     ) -> Vec3A {
-        let targets = moment.targets(self);
         let mut shade = Shade {
             world: self,
             moment,

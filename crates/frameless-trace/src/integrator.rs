@@ -5,12 +5,16 @@ use frameless_scene::View;
 
 use crate::camera::Camera;
 use crate::direct::{NoProbe, Probe};
+use crate::holes::Chance;
 use crate::kernel::Isa;
 #[cfg(target_arch = "x86_64")]
 use crate::kernel::avx2;
 use crate::lens::{self, Lens};
 use crate::moment::Moment;
 use crate::numbers::Numbers;
+use crate::order::by_tile;
+use crate::packet::TOGETHER;
+use crate::ray::Ray;
 use crate::traverse::Stack;
 use crate::world::World;
 
@@ -84,6 +88,34 @@ impl World {
         answer
     }
 
+    /// Many samples, in the order of the requests: what [`World::trace`] says of each. No surfaces if nobody asks for them.
+    pub fn trace_all(
+        &self,
+        moment: &Moment,
+        view: &View,
+        size: Size,
+        requests: &[Request],
+        settings: &Settings,
+    ) -> (Vec<[f32; 3]>, Vec<Surface>) {
+        let mut order = Vec::new();
+        by_tile(requests, size, &mut order);
+        let mut rgb = vec![[0.0; 3]; requests.len()];
+        let count = if settings.surfaces { requests.len() } else { 0 };
+        let mut surfaces = vec![Surface::default(); count];
+        let mut places = order.iter().map(|&index| index as usize);
+        let put = |colour, surface| {
+            let place = places.next().expect("as many answers as requests");
+            rgb[place] = colour;
+            if let Some(to) = surfaces.get_mut(place) {
+                *to = surface;
+            }
+        };
+        let sorted = order.iter().map(|&index| requests[index as usize]);
+        let seen = (moment, &Camera::new(view, size));
+        self.samples(seen, sorted, settings, &mut Stack::new(), put);
+        (rgb, surfaces)
+    }
+
     /// Hands the answers to `take`, in the order of the requests. The whole of it has the instructions of the walk: they are also what
     /// textures and random numbers are glad of.
     #[inline]
@@ -104,7 +136,6 @@ impl World {
     }
 
     /// One sample, with `probe` told of all that happens.
-    #[inline(always)]
     pub(crate) fn sample_with(
         &self,
         moment: &Moment,
@@ -114,22 +145,51 @@ impl World {
         stack: &mut Stack,
         probe: &mut impl Probe,
     ) -> ([f32; 3], Surface) {
-        let (ray, cone) = (camera.ray(request), camera.cone());
-        match (settings.integrator, settings.lens) {
-            (Integrator::Direct, _) => self.radiance(moment, (ray, cone), settings, stack, probe),
-            (Integrator::Path, lens) => {
-                let through = match lens {
-                    None => ray,
-                    Some(lens) => lens.ray(camera, &ray, Numbers::of(request).lens()),
-                };
+        let ray = first_ray(camera, request, settings);
+        let met = self.nearest(moment, &ray, || first_chance(request, settings), stack);
+        let seen = (ray, met, camera.cone());
+        match settings.integrator {
+            Integrator::Direct => self.radiance(moment, seen, settings, stack, probe),
+            Integrator::Path => {
                 let (rgb, surface) =
-                    self.path_radiance(moment, (through, cone), request, settings, stack, probe);
-                match lens {
-                    None => (rgb, surface),
-                    Some(_) => (rgb, lens::in_own_pixel(surface, moment, camera, &ray)),
-                }
+                    self.path_radiance(moment, seen, request, settings, stack, probe);
+                (rgb, in_own_pixel(surface, moment, camera, request, settings))
             }
         }
+    }
+}
+
+/// Of the pixel, through the lens if there is one.
+#[inline(always)]
+fn first_ray(camera: &Camera, request: &Request, settings: &Settings) -> Ray {
+    let ray = camera.ray(request);
+    match (settings.integrator, settings.lens) {
+        (Integrator::Path, Some(lens)) => lens.ray(camera, &ray, Numbers::of(request).lens()),
+        _ => ray,
+    }
+}
+
+/// How what it meets first and blends decides whether it is there.
+#[inline(always)]
+fn first_chance(request: &Request, settings: &Settings) -> Chance {
+    match settings.integrator {
+        Integrator::Direct => Chance::Never,
+        Integrator::Path => Numbers::of(request).chance(0),
+    }
+}
+
+/// However a lens has blurred it.
+#[inline(always)]
+fn in_own_pixel(
+    surface: Surface,
+    moment: &Moment,
+    camera: &Camera,
+    request: &Request,
+    settings: &Settings,
+) -> Surface {
+    match settings.lens {
+        None => surface,
+        Some(_) => lens::in_own_pixel(surface, moment, camera, &camera.ray(request)),
     }
 }
 
@@ -144,13 +204,39 @@ struct Samples<'a, R, T> {
 }
 
 impl<R: Iterator<Item = Request>, T: FnMut([f32; 3], Surface)> Samples<'_, R, T> {
+    /// In groups whose first rays, and those from what they hit to lights, are walked together where it is worth it.
     #[inline(always)]
     fn trace(self) {
-        let Samples { world, moment, camera, requests, settings, stack, mut take } = self;
-        for request in requests {
-            let (rgb, surface) =
-                world.sample_with(moment, camera, &request, settings, stack, &mut NoProbe);
-            take(rgb, surface);
+        let Samples { world, moment, camera, mut requests, settings, stack, mut take } = self;
+        let cone = camera.cone();
+        loop {
+            let (mut asked, mut rays) = ([Request::default(); TOGETHER], [Ray::NONE; TOGETHER]);
+            let mut count = 0;
+            for ((to, ray), request) in asked.iter_mut().zip(&mut rays).zip(&mut requests) {
+                (*to, *ray) = (request, first_ray(camera, &request, settings));
+                count += 1;
+            }
+            let (asked, rays) = (&asked[..count], &rays[..count]);
+            if rays.is_empty() {
+                return;
+            }
+            let mut met = [None; TOGETHER];
+            let met = &mut met[..count];
+            let chance = |index: usize| first_chance(&asked[index], settings);
+            world.nearest_of(moment, rays, chance, met, stack);
+            match settings.integrator {
+                Integrator::Direct => {
+                    world.radiances(moment, (rays, met, cone), settings, stack, &mut take);
+                }
+                Integrator::Path => {
+                    for ((request, &ray), &met) in asked.iter().zip(rays).zip(&*met) {
+                        let (seen, probe) = ((ray, met, cone), &mut NoProbe);
+                        let (rgb, surface) =
+                            world.path_radiance(moment, seen, request, settings, stack, probe);
+                        take(rgb, in_own_pixel(surface, moment, camera, request, settings));
+                    }
+                }
+            }
         }
     }
 }

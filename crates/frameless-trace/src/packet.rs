@@ -1,20 +1,20 @@
-//! Sixteen rays from one point that go much the same way, walked together: a node is tested once for all of them, and a triangle for eight
-//! at a time.
+//! Up to sixteen rays that go much the same way, walked together: a node is tested once for all of them, and a triangle for eight at a time.
 //!
-//! A node's boxes are tested against the beam that the rays form, by interval arithmetic: with o the origin and r in [r⁻, r⁺] the
-//! reciprocal directions, all of one sign, a plane p is met at (p − o)·r, which is least and greatest at r⁻ or r⁺. Rounding is monotonic, so
-//! that the bounds hold for what each ray alone would compute. What is found is the same, bit for bit, as for each ray alone: triangles are
-//! tested by the same operations, and which of several hits is best does not depend on their order.
+//! A node's boxes are tested against the beam that the rays form, by interval arithmetic: with o in [o⁻, o⁺] the origins and r in [r⁻, r⁺]
+//! the reciprocal directions, all of one sign, a plane p is met at (p − o)·r. That is least at one of o⁻ and o⁺, by the sign of r, and at r⁻
+//! or r⁺, and greatest at the other origin. Rounding is monotonic, so that the bounds hold for what each ray alone would compute. A leaf's
+//! own box is tested for each ray by the operations that the ray alone would use, and those of the nodes above contain it. What is found is the
+//! same, bit for bit, as for each ray alone: triangles are tested by the same operations, too, and which of several hits is best, or whether
+//! there is one, does not depend on their order.
 
 use glam::Vec3A;
 
 use crate::kernel::{Eight, Kernel, Pack, SLAB_MARGIN, ShearRay};
 use crate::ray::{Hit, Ray};
-use crate::top::take;
 use crate::traverse::{Entry, Stack};
 use crate::wide::{Child, Node};
 
-/// Rays that are walked together.
+/// Rays that are walked together, at most.
 pub(crate) const TOGETHER: usize = 16;
 /// Directions may differ by this much of their length per axis. More: neighbours part before they reach what they hit, and each node is
 /// visited for a few of them only.
@@ -22,44 +22,62 @@ const WIDEST: f32 = 0.12;
 /// So many rays or fewer in a leaf's box test its triangles one by one, four triangles at a time.
 const FEW: u32 = 2;
 
-/// A leaf that fewer of its rays reach on average is cheaper one by one: then triangles are about as small as the rays are apart.
+/// Rays that are worth being made a packet of.
+const FEWEST: usize = 4;
+/// Leaves that fewer of its rays reach on average are cheaper one by one: then triangles are about as small as the rays are apart. The beam
+/// that all of them share counts as much as a leaf that each has to itself, so that groups that meet next to nothing go on together.
 const LEAST: u32 = 3;
 /// A try costs some percent of what it may save.
 const RESTS: u32 = 15;
+
+/// The t_max of a ray that looks for nothing, or for nothing more: before all boxes and triangles.
+const DONE: f32 = -1.0;
 
 /// A number per ray, in halves.
 type PerRay = [[f32; 8]; 2];
 
 /// See the module.
 pub(crate) struct Packet {
-    origin: [f32; 3],
+    origin: [PerRay; 3],
     reciprocal: [PerRay; 3],
+    /// Of the origins that from which a plane is met first, and that from which it is met last.
+    first_origin: [f32; 3],
+    last_origin: [f32; 3],
     least_reciprocal: [f32; 3],
     most_reciprocal: [f32; 3],
     entry: [usize; 3],
     /// As in [`ShearRay`].
     shear: [PerRay; 3],
     axes: [usize; 3],
-    /// Of what each ray has hit so far.
+    /// Up to where each ray looks for hits.
     t_max: PerRay,
 }
 
 impl Packet {
-    /// `None` if they are better walked one by one.
+    /// As [`Packet::new`]; `None` also if there are few rays, or if the last groups have shown that it is not worth it.
     #[inline(always)]
-    pub(crate) fn new<K: Kernel>(rays: &[Ray; TOGETHER]) -> Option<Packet> {
-        let first = &rays[0];
-        let (mut least, mut most, mut sum) = (first.direction, first.direction, Vec3A::ZERO);
+    pub(crate) fn worth<K: Kernel>(rays: &[Ray], t_max: f32, worth: &mut Worth) -> Option<Packet> {
+        (rays.len() >= FEWEST && worth.is_worth_trying())
+            .then(|| Packet::new::<K>(rays, t_max))
+            .flatten()
+    }
+
+    /// Of 1 to [`TOGETHER`] rays, whose hits count up to `t_max`. `None` if they are better walked one by one.
+    #[inline(always)]
+    pub(crate) fn new<K: Kernel>(rays: &[Ray], t_max: f32) -> Option<Packet> {
+        let first = rays.first()?;
+        let (mut least, mut most) = (first.direction, first.direction);
+        let (mut low, mut high) = (first.origin, first.origin);
+        let (mut directions, mut origins) = (Vec3A::ZERO, Vec3A::ZERO);
         for ray in rays {
-            if ray.origin != first.origin {
-                return None;
-            }
             (least, most) = (least.min(ray.direction), most.max(ray.direction));
+            (low, high) = (low.min(ray.origin), high.max(ray.origin));
             // Not finite if any of them is not.
-            sum += ray.direction;
+            directions += ray.direction;
+            origins += ray.origin;
         }
         let is_narrow = (most - least).max_element() <= WIDEST * first.direction.length();
-        if !(is_narrow && sum.is_finite() && first.is_traceable()) {
+        if !(is_narrow && directions.is_finite() && origins.is_finite()) {
             return None;
         }
         // Of one sign and not zero, so that reciprocals are finite.
@@ -72,22 +90,33 @@ impl Packet {
         if !(one_way.all() && is_one_axis) {
             return None;
         }
-        let mut direction: [PerRay; 3] = [[[0.0; 8]; 2]; 3];
-        for (axis, per_ray) in direction.iter_mut().enumerate() {
-            for (to, ray) in per_ray.as_flattened_mut().iter_mut().zip(rays) {
-                *to = ray.direction[axis];
+        // Those that are not there are as the first, and done.
+        let (mut direction, mut origin) = ([[[0.0; 8]; 2]; 3], [[[0.0; 8]; 2]; 3]);
+        let mut until = [[DONE; 8]; 2];
+        for ray in 0..TOGETHER {
+            let (half, lane) = (ray / 8, ray % 8);
+            let Ray { origin: from, direction: along } = rays.get(ray).unwrap_or(first);
+            for axis in 0..3 {
+                origin[axis][half][lane] = from[axis];
+                direction[axis][half][lane] = along[axis];
+            }
+            if ray < rays.len() {
+                until[half][lane] = t_max;
             }
         }
+        let upwards = first.direction.cmpgt(Vec3A::ZERO);
         let mut packet = Packet {
-            origin: first.origin.to_array(),
+            origin,
             reciprocal: [[[0.0; 8]; 2]; 3],
+            first_origin: Vec3A::select(upwards, high, low).to_array(),
+            last_origin: Vec3A::select(upwards, low, high).to_array(),
             // Of one sign: the reciprocal falls as the direction grows.
             least_reciprocal: most.recip().to_array(),
             most_reciprocal: least.recip().to_array(),
             entry: first.direction.to_array().map(|d| usize::from(d < 0.0)),
             shear: [[[0.0; 8]; 2]; 3],
             axes,
-            t_max: [[f32::MAX; 8]; 2],
+            t_max: until,
         };
         let one = K::Eight::splat(1.0);
         for half in [0, 1] {
@@ -103,13 +132,26 @@ impl Packet {
         Some(packet)
     }
 
+    /// Up to where the ray that looks farthest does so.
+    #[inline(always)]
+    fn farthest(&self) -> f32 {
+        self.t_max.as_flattened().iter().copied().fold(DONE, f32::max)
+    }
+
+    /// Whether any of the rays may meet a child of this node.
+    #[inline(always)]
+    pub(crate) fn may_meet<K: Kernel>(&self, node: &Node) -> bool {
+        self.boxes::<K>(node, self.farthest()).0 != 0
+    }
+
     /// One of the rays.
     #[inline(always)]
     fn one(&self, ray: usize) -> ShearRay {
         let (half, lane) = (ray / 8 % 2, ray % 8);
         let shear =
             [self.shear[0][half][lane], self.shear[1][half][lane], self.shear[2][half][lane]];
-        ShearRay { origin: self.origin, axes: self.axes, shear }
+        let origin = self.origin.map(|origin| origin[half][lane]);
+        ShearRay { origin, axes: self.axes, shear }
     }
 
     // Small functions instead of closures, since those cannot be made to be inlined, and calls would cost more than what is in them.
@@ -125,11 +167,12 @@ impl Packet {
     fn boxes<K: Kernel>(&self, node: &Node, t_max: f32) -> (u32, [f32; 8]) {
         let (mut near, mut far) = (K::Eight::splat(0.0), K::Eight::splat(t_max));
         for axis in 0..3 {
-            let origin = K::Eight::splat(self.origin[axis]);
+            let first = K::Eight::splat(self.first_origin[axis]);
+            let last = K::Eight::splat(self.last_origin[axis]);
             let least = K::Eight::splat(self.least_reciprocal[axis]);
             let most = K::Eight::splat(self.most_reciprocal[axis]);
-            let enters = K::Eight::load(self.row(node, axis, 0)).sub(origin);
-            let leaves = K::Eight::load(self.row(node, axis, 1)).sub(origin);
+            let enters = K::Eight::load(self.row(node, axis, 0)).sub(first);
+            let leaves = K::Eight::load(self.row(node, axis, 1)).sub(last);
             near = enters.mul(least).min(enters.mul(most)).max(near);
             far = leaves.mul(least).max(leaves.mul(most)).min(far);
         }
@@ -146,11 +189,12 @@ impl Packet {
     fn half_in<K: Kernel>(&self, node: &Node, slot: usize, half: usize) -> u32 {
         let (mut near, mut far) = (K::Eight::splat(0.0), K::Eight::load(&self.t_max[half]));
         for axis in 0..3 {
+            let origin = K::Eight::load(&self.origin[axis][half]);
             let reciprocal = K::Eight::load(&self.reciprocal[axis][half]);
-            let enters = self.row(node, axis, 0)[slot & 7] - self.origin[axis];
-            let leaves = self.row(node, axis, 1)[slot & 7] - self.origin[axis];
-            near = K::Eight::splat(enters).mul(reciprocal).max(near);
-            far = K::Eight::splat(leaves).mul(reciprocal).min(far);
+            let enters = K::Eight::splat(self.row(node, axis, 0)[slot & 7]).sub(origin);
+            let leaves = K::Eight::splat(self.row(node, axis, 1)[slot & 7]).sub(origin);
+            near = enters.mul(reciprocal).max(near);
+            far = leaves.mul(reciprocal).min(far);
         }
         near.at_most(far.mul(K::Eight::splat(SLAB_MARGIN)))
     }
@@ -164,9 +208,9 @@ impl Packet {
         half: usize,
     ) -> [K::Eight; 3] {
         let [kx, ky, kz] = self.axes;
-        let x = K::Eight::splat(corner[kx][lane & 3] - self.origin[kx]);
-        let y = K::Eight::splat(corner[ky][lane & 3] - self.origin[ky]);
-        let z = K::Eight::splat(corner[kz][lane & 3] - self.origin[kz]);
+        let x = K::Eight::splat(corner[kx][lane & 3]).sub(K::Eight::load(&self.origin[kx][half]));
+        let y = K::Eight::splat(corner[ky][lane & 3]).sub(K::Eight::load(&self.origin[ky][half]));
+        let z = K::Eight::splat(corner[kz][lane & 3]).sub(K::Eight::load(&self.origin[kz][half]));
         let sx = K::Eight::load(&self.shear[0][half]);
         let sy = K::Eight::load(&self.shear[1][half]);
         let sz = K::Eight::load(&self.shear[2][half]);
@@ -222,25 +266,67 @@ impl Worth {
     #[inline(always)]
     pub(crate) fn learn(&mut self, [leaves, rays]: [u32; 2]) {
         self.leaves = self.leaves - self.leaves / 4 + leaves;
-        self.rays = self.rays - self.rays / 4 + rays;
+        self.rays = self.rays - self.rays / 4 + rays + TOGETHER as u32;
         if self.rays < LEAST * self.leaves {
             self.rests = RESTS;
         }
     }
 }
 
-/// Brings `best` to the nearest hit of each ray; returns how many leaves were visited and how many rays were in them. `place`: instance and triangle of what is in the packs.
+/// What rays look for.
+pub(crate) trait Finds {
+    /// Told of a hit within the ray's range; returns where the range ends from now on.
+    fn hit(&mut self, ray: usize, hit: &Hit) -> Option<f32>;
+}
+
+/// Brings each to the nearest hit of its ray.
+pub(crate) struct Nearest<'a>(pub(crate) &'a mut [Hit; TOGETHER]);
+
+impl Finds for Nearest<'_> {
+    #[inline(always)]
+    fn hit(&mut self, ray: usize, hit: &Hit) -> Option<f32> {
+        let best = &mut self.0[ray];
+        let is_nearer = hit.is_before(best);
+        *best = if is_nearer { *hit } else { *best };
+        is_nearer.then_some(hit.t)
+    }
+}
+
+/// Notes which rays hit anything at all. Bits by ray.
+pub(crate) struct Any<A> {
+    /// Whether an instance may let rays pass, so that a ray that hits it has to be asked about alone.
+    pub(crate) asks: A,
+    /// Those that certainly hit something.
+    pub(crate) blocked: u32,
+    /// Those that have met something that may let them pass.
+    pub(crate) doubtful: u32,
+}
+
+impl<A: Fn(u32) -> bool> Finds for Any<A> {
+    #[inline(always)]
+    fn hit(&mut self, ray: usize, hit: &Hit) -> Option<f32> {
+        if (self.asks)(hit.instance) {
+            self.doubtful |= 1 << ray;
+            return None;
+        }
+        self.blocked |= 1 << ray;
+        Some(DONE)
+    }
+}
+
+/// Tells `finds` of the hits; returns how many leaves were visited and how many rays were in them. `place`: instance and triangle of what is
+/// in the packs.
 #[inline(always)]
 pub(crate) fn walk_together<K: Kernel>(
     (nodes, packs): (&[Node], &[Pack]),
     packet: &mut Packet,
-    best: &mut [Hit; TOGETHER],
+    finds: &mut impl Finds,
     stack: &mut Stack,
     place: impl Fn(u32) -> (u32, u32),
 ) -> [u32; 2] {
     let mut met = [0; 2];
     let base = stack.length();
-    let mut farthest = f32::MAX;
+    let mut farthest = packet.farthest();
     let mut current = Child::ROOT;
     let mut came_from = 0;
     loop {
@@ -250,10 +336,10 @@ pub(crate) fn walk_together<K: Kernel>(
             met = [met[0] + 1, met[1] + rays.count_ones()];
             let mut found = false;
             for pack in &packs[current.items()] {
-                found |= visit::<K>(pack, packet, rays, best, &place);
+                found |= visit::<K>(pack, packet, rays, finds, &place);
             }
             if found {
-                farthest = packet.t_max.as_flattened().iter().copied().fold(0.0, f32::max);
+                farthest = packet.farthest();
             }
         } else {
             let index = current.node();
@@ -283,18 +369,18 @@ pub(crate) fn walk_together<K: Kernel>(
     }
 }
 
-/// A pack against some of the rays. Whether any of them hit it.
+/// A pack against some of the rays. Whether any range has become shorter.
 #[inline(always)]
 fn visit<K: Kernel>(
     pack: &Pack,
     packet: &mut Packet,
     rays: u32,
-    best: &mut [Hit; TOGETHER],
+    finds: &mut impl Finds,
     place: &impl Fn(u32) -> (u32, u32),
 ) -> bool {
     let mut found = false;
     if rays.count_ones() <= FEW {
-        alone::<K>(pack, packet, rays, best, place, &mut found);
+        alone::<K>(pack, packet, rays, finds, place, &mut found);
         return found;
     }
     for lane in 0..4 {
@@ -302,12 +388,14 @@ fn visit<K: Kernel>(
             break;
         }
         for half in 0..2 {
-            if rays >> (8 * half) & 0xff == 0 {
+            let asked = rays >> (8 * half) & 0xff;
+            if asked == 0 {
                 continue;
             }
-            let (mut hit, on_edge, [t, v, w]) = packet.meet::<K>(pack, lane, half);
+            let (hit, on_edge, [t, v, w]) = packet.meet::<K>(pack, lane, half);
+            let (mut hit, on_edge) = (hit & asked, on_edge & asked);
             if on_edge != 0 {
-                alone::<K>(pack, packet, on_edge << (8 * half), best, place, &mut found);
+                alone::<K>(pack, packet, on_edge << (8 * half), finds, place, &mut found);
             }
             if hit == 0 {
                 continue;
@@ -319,9 +407,8 @@ fn visit<K: Kernel>(
                 hit &= hit - 1;
                 let barycentric = [v[ray], w[ray]];
                 let hit = Hit { t: t[ray], barycentric, primitive, instance };
-                if hit.is_before(&best[8 * half + ray]) {
-                    best[8 * half + ray] = hit;
-                    packet.t_max[half][ray] = hit.t;
+                if let Some(t_max) = finds.hit(8 * half + ray, &hit) {
+                    packet.t_max[half][ray] = t_max;
                     found = true;
                 }
             }
@@ -336,17 +423,25 @@ fn alone<K: Kernel>(
     pack: &Pack,
     packet: &mut Packet,
     mut rays: u32,
-    best: &mut [Hit; TOGETHER],
+    finds: &mut impl Finds,
     place: &impl Fn(u32) -> (u32, u32),
     found: &mut bool,
 ) {
     while rays != 0 {
         let ray = rays.trailing_zeros() as usize % TOGETHER;
         rays &= rays - 1;
-        let lanes = K::triangles(pack, &packet.one(ray), best[ray].t);
-        if lanes.mask != 0 && take::<false>(pack, &lanes, &mut best[ray], place, |_| true) {
-            packet.t_max[ray / 8][ray % 8] = best[ray].t;
-            *found = true;
+        let lanes = K::triangles(pack, &packet.one(ray), packet.t_max[ray / 8][ray % 8]);
+        let mut mask = lanes.mask;
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize & 3;
+            mask &= mask - 1;
+            let (instance, primitive) = place(pack.primitive[lane]);
+            let barycentric = [lanes.v[lane], lanes.w[lane]];
+            let hit = Hit { t: lanes.t[lane], barycentric, primitive, instance };
+            if let Some(t_max) = finds.hit(ray, &hit) {
+                packet.t_max[ray / 8][ray % 8] = t_max;
+                *found = true;
+            }
         }
     }
 }

@@ -29,7 +29,7 @@ use crate::integrator::Settings;
 use crate::moment::Moment;
 use crate::numbers::Numbers;
 use crate::point::Point;
-use crate::ray::Ray;
+use crate::ray::{Hit, Ray};
 use crate::surroundings::FromAfar;
 #[cfg(doc)]
 use crate::surroundings::Surroundings;
@@ -45,12 +45,13 @@ const NEARLY_THERE: f32 = 1.0 - 1e-4;
 const MOST_LIKELY_ON: f32 = 0.95;
 
 impl World {
-    /// What comes back along a ray whose direction has unit length, by one random path.
+    /// What comes back along a ray whose direction has unit length, by one random path. `met`: what the ray meets first, by
+    /// `first_chance`.
     #[inline(always)]
     pub(crate) fn path_radiance(
         &self,
         moment: &Moment,
-        (mut ray, mut cone): (Ray, Cone),
+        (mut ray, mut met, mut cone): (Ray, Option<Hit>, Cone),
         request: &Request,
         settings: &Settings,
         stack: &mut Stack,
@@ -69,11 +70,6 @@ impl World {
         loop {
             probe
                 .note(|| format!("ray {depth}: from {:.5} along {:.5}", ray.origin, ray.direction));
-            let chance = || numbers.chance(depth);
-            let met = match culls {
-                false => self.nearest(moment, &ray, chance, stack),
-                true => self.behind_back(moment, &ray, chance, stack),
-            };
             let Some(hit) = met else {
                 let gives = throughput * self.sky_seen(ray.direction, density);
                 probe.note(|| format!("  nothing hit: adds {gives:.6}"));
@@ -86,6 +82,7 @@ impl World {
             if depth == 0 && !culls && self.is_culled(&hit, &point) {
                 probe.note(|| "  the back of what is single-sided, which the camera passes".into());
                 culls = true;
+                met = self.behind_back(moment, &ray, || numbers.chance(depth), stack);
                 continue;
             }
             let material = &self.scene().materials[point.material as usize];
@@ -169,6 +166,7 @@ impl World {
             ray = Ray { origin, direction: next.direction };
             depth += 1;
             culls = false;
+            met = self.nearest(moment, &ray, || numbers.chance(depth), stack);
         }
         (finite(radiance), first.surface(&ray))
     }

@@ -42,21 +42,41 @@ pub(crate) struct Point {
     pub(crate) material: u32,
 }
 
-/// A point before the object's transform. Normals on the ray's side, of any length; may be zero.
+/// A point before the object's transform. Normals on the ray's side.
 struct Local<'a> {
     position: Vec3A,
     anchor: Vec3A,
     shadow_origin: Vec3A,
-    geometric_normal: Vec3A,
+    /// Unit length, in the world; `None` where it has no direction there.
+    unit_normal: Option<Vec3A>,
+    /// For shading, of any length; may be zero.
     normal: Vec3A,
-    /// No coordinate that went into `position` is larger; rounding errors are in proportion to it.
-    extent: Vec3A,
+    /// See [`OFFSET`], in the world.
+    offset_m: f32,
     /// Where textures are looked up; its footprint is not known yet.
     patch: Patch<'a>,
     triangle: Option<Triangle>,
     is_front: bool,
     /// Linear RGBA of the vertices.
     color: Vec4,
+    material: u32,
+}
+
+/// One side of a triangle, with what all of its points have in common.
+pub(crate) struct Facet<'a> {
+    instance: u32,
+    triangle: Triangle,
+    mesh: &'a Mesh,
+    vertices: [usize; 3],
+    /// By the triangle's winding, whatever side it is seen from; of any length, in the object.
+    winding_normal: Vec3A,
+    /// Of the vertices, on this side; `None` if the mesh has none.
+    normals: Option<[Vec3A; 3]>,
+    /// See [`Local`].
+    unit_normal: Option<Vec3A>,
+    offset_m: f32,
+    /// Linear RGBA of the vertices; `None`: white.
+    colors: Option<[Vec4; 3]>,
     material: u32,
 }
 
@@ -83,8 +103,19 @@ impl Point {
     /// Where `ray` has met something. `cone`: how wide it is where it begins.
     #[inline(always)]
     pub(crate) fn new(world: &World, moment: &Moment, ray: &Ray, hit: &Hit, cone: Cone) -> Point {
+        Point::on(world, moment, (ray, hit, cone), &mut None)
+    }
+
+    /// The same, for many points one after the other: `facet` is what the last of them was on, and then what this one is.
+    #[inline(always)]
+    pub(crate) fn on<'a>(
+        world: &'a World,
+        moment: &Moment,
+        (ray, hit, cone): (&Ray, &Hit, Cone),
+        facet: &mut Option<Facet<'a>>,
+    ) -> Point {
         let placed = moment.placed(hit.instance);
-        let mut local = local(world, moment, placed, ray, hit);
+        let mut local = local(world, moment, (ray, hit), facet);
         let number = local.material as usize;
         let material = &world.scene().materials[number];
         if world.is_plain[number] {
@@ -134,10 +165,9 @@ pub(crate) struct Placement<'a> {
 
 impl<'a> Placement<'a> {
     pub(crate) fn new(world: &'a World, moment: &Moment, ray: &Ray, hit: &Hit) -> Placement<'a> {
-        let placed = moment.placed(hit.instance);
-        let local = local(world, moment, placed, ray, hit);
-        let normal = placed.object_from_world.matrix3.transpose() * local.geometric_normal;
-        let cosine = -normal.normalize_or_zero().dot(ray.direction.normalize_or_zero());
+        let local = local(world, moment, (ray, hit), &mut None);
+        let normal = local.unit_normal.unwrap_or(Vec3A::ZERO);
+        let cosine = -normal.dot(ray.direction.normalize_or_zero());
         let Local { patch, color, is_front, .. } = local;
         Placement { patch, color, is_front, cosine }
     }
@@ -160,27 +190,31 @@ fn bend(
 fn local<'a>(
     world: &'a World,
     moment: &Moment,
-    placed: &Placed,
-    ray: &Ray,
-    hit: &Hit,
+    (ray, hit): (&Ray, &Hit),
+    facet: &mut Option<Facet<'a>>,
 ) -> Local<'a> {
+    let placed = moment.placed(hit.instance);
+    let local_ray = ray.transformed(&placed.object_from_world);
+    if let Some(facet) = facet
+        && facet.is_of(hit, &local_ray)
+    {
+        return facet.at(hit);
+    }
     let scene = world.scene();
     let geometry = scene.instances[hit.instance as usize].geometry;
-    let local_ray = ray.transformed(&placed.object_from_world);
-    match &scene.geometries[geometry as usize] {
-        Geometry::Mesh(mesh) => match moment.deforming(placed) {
-            None => on_mesh(mesh, &Rigid(mesh), &local_ray, hit),
-            Some(deforming) => {
-                let mut local = on_mesh(mesh, deforming.now(), &local_ray, hit);
-                local.anchor = weights(hit).into();
-                if let Some(triangle) = &mut local.triangle {
-                    triangle.deforms = true;
-                }
-                local
-            }
-        },
-        Geometry::Sphere { material } => on_sphere(*material, &local_ray, hit.t),
-    }
+    let mesh = match &scene.geometries[geometry as usize] {
+        Geometry::Sphere { material } => return on_sphere(*material, placed, &local_ray, hit.t),
+        Geometry::Mesh(mesh) => mesh,
+    };
+    let new = match moment.deforming(placed) {
+        None => Facet::new(mesh, &Rigid(mesh), placed, &local_ray, hit),
+        Some(deforming) => {
+            let mut new = Facet::new(mesh, deforming.now(), placed, &local_ray, hit);
+            new.triangle.deforms = true;
+            new
+        }
+    };
+    facet.insert(new).at(hit)
 }
 
 impl Local<'_> {
@@ -250,7 +284,7 @@ fn weights(hit: &Hit) -> [f32; 3] {
     [1.0 - v - w, v, w]
 }
 
-fn on_sphere<'a>(material: u32, ray: &Ray, t: f32) -> Local<'a> {
+fn on_sphere<'a>(material: u32, placed: &Placed, ray: &Ray, t: f32) -> Local<'a> {
     // Back onto the sphere: t is relative to a ray that may come from far away.
     let position = (ray.origin + t * ray.direction).normalize_or_zero();
     let is_front = position.dot(ray.direction) <= 0.0;
@@ -259,9 +293,9 @@ fn on_sphere<'a>(material: u32, ray: &Ray, t: f32) -> Local<'a> {
         position,
         anchor: position,
         shadow_origin: position,
-        geometric_normal: normal,
+        unit_normal: unit_normal(placed, normal),
         normal,
-        extent: Vec3A::ONE,
+        offset_m: offset_m(placed, Vec3A::ONE),
         patch: Patch::Sphere { uv: sphere::texture_coordinates(position) },
         triangle: None,
         is_front,
@@ -270,54 +304,94 @@ fn on_sphere<'a>(material: u32, ray: &Ray, t: f32) -> Local<'a> {
     }
 }
 
-#[inline(always)]
-fn on_mesh<'a>(mesh: &'a Mesh, now: &impl Vertices, ray: &Ray, hit: &Hit) -> Local<'a> {
-    let index = hit.primitive as usize;
-    let material = mesh.triangle_materials[index];
-    let vertices = mesh.triangles[index].map(|vertex| vertex as usize);
-    let corners = vertices.map(|vertex| now.position(vertex));
-    let [a, b, c] = corners;
-    let weights = weights(hit);
-    let position = blend(weights, corners);
-    let winding_normal = (b - a).cross(c - a);
-    let is_front = winding_normal.dot(ray.direction) <= 0.0;
-    let geometric_normal = if is_front { winding_normal } else { -winding_normal };
-    let (normal, shadow_origin) = match vertices.map(|vertex| now.normal(vertex)) {
-        [Some(a), Some(b), Some(c)] => {
-            let normals = [a, b, c].map(|normal| facing(normal, geometric_normal));
-            (blend(weights, normals), on_smooth_surface(position, weights, corners, normals))
+impl<'a> Facet<'a> {
+    #[inline(always)]
+    fn new(
+        mesh: &'a Mesh,
+        now: &impl Vertices,
+        placed: &Placed,
+        ray: &Ray,
+        hit: &Hit,
+    ) -> Facet<'a> {
+        let index = hit.primitive as usize;
+        let vertices = mesh.triangles[index].map(|vertex| vertex as usize);
+        let corners = vertices.map(|vertex| now.position(vertex));
+        let [a, b, c] = corners;
+        let winding_normal = (b - a).cross(c - a);
+        let is_front = winding_normal.dot(ray.direction) <= 0.0;
+        let geometric_normal = if is_front { winding_normal } else { -winding_normal };
+        let normals = match vertices.map(|vertex| now.normal(vertex)) {
+            [Some(a), Some(b), Some(c)] => {
+                Some([a, b, c].map(|normal| facing(normal, geometric_normal)))
+            }
+            _ => None,
+        };
+        let colors = now.colors();
+        let color = |vertex: usize| Vec4::max(colors[vertex], Vec4::ZERO);
+        Facet {
+            instance: hit.instance,
+            triangle: Triangle { index, corners, is_front, deforms: false },
+            mesh,
+            vertices,
+            winding_normal,
+            normals,
+            unit_normal: unit_normal(placed, geometric_normal),
+            offset_m: offset_m(placed, a.abs().max(b.abs()).max(c.abs())),
+            colors: (!colors.is_empty()).then(|| vertices.map(color)),
+            material: mesh.triangle_materials[index],
         }
-        _ => (geometric_normal, position),
-    };
-    Local {
-        position,
-        anchor: position,
-        shadow_origin,
-        geometric_normal,
-        normal,
-        extent: a.abs().max(b.abs()).max(c.abs()),
-        patch: Patch::Triangle { mesh, vertices, weights, footprint: 0.0 },
-        triangle: Some(Triangle { index, corners, is_front, deforms: false }),
-        is_front,
-        color: vertex_color(now, vertices, weights),
-        material,
     }
-}
 
-/// Linear RGBA; white of a mesh without colours.
-#[inline(always)]
-fn vertex_color(now: &impl Vertices, vertices: [usize; 3], weights: [f32; 3]) -> Vec4 {
-    let colors = now.colors();
-    if colors.is_empty() {
-        return Vec4::ONE;
+    /// Whether a ray, in the object's coordinates, has hit this triangle from this side.
+    #[inline(always)]
+    fn is_of(&self, hit: &Hit, ray: &Ray) -> bool {
+        let Triangle { index, is_front, .. } = self.triangle;
+        (self.instance, index) == (hit.instance, hit.primitive as usize)
+            && is_front == (self.winding_normal.dot(ray.direction) <= 0.0)
     }
-    let [a, b, c] = vertices.map(|vertex| Vec4::max(colors[vertex], Vec4::ZERO));
-    weights[0] * a + weights[1] * b + weights[2] * c
+
+    /// One of its points.
+    #[inline(always)]
+    fn at(&self, hit: &Hit) -> Local<'a> {
+        let Triangle { corners, is_front, deforms, .. } = self.triangle;
+        let weights = weights(hit);
+        let position = blend(weights, corners);
+        let (normal, shadow_origin) = match self.normals {
+            Some(normals) => {
+                (blend(weights, normals), on_smooth_surface(position, weights, corners, normals))
+            }
+            None if is_front => (self.winding_normal, position),
+            None => (-self.winding_normal, position),
+        };
+        let color = self
+            .colors
+            .map_or(Vec4::ONE, |[a, b, c]| weights[0] * a + weights[1] * b + weights[2] * c);
+        let (mesh, vertices) = (self.mesh, self.vertices);
+        Local {
+            position,
+            anchor: if deforms { weights.into() } else { position },
+            shadow_origin,
+            unit_normal: self.unit_normal,
+            normal,
+            offset_m: self.offset_m,
+            patch: Patch::Triangle { mesh, vertices, weights, footprint: 0.0 },
+            triangle: Some(self.triangle),
+            is_front,
+            color,
+            material: self.material,
+        }
+    }
 }
 
 #[inline(always)]
 fn blend(weights: [f32; 3], values: [Vec3A; 3]) -> Vec3A {
     weights[0] * values[0] + weights[1] * values[1] + weights[2] * values[2]
+}
+
+/// A normal of the object's in the world, where normals transform with the inverse's transpose.
+#[inline(always)]
+fn unit_normal(placed: &Placed, normal: Vec3A) -> Option<Vec3A> {
+    (placed.object_from_world.matrix3.transpose() * normal).try_normalize()
 }
 
 /// `normal` or its opposite, whichever is on the side of `direction`.
@@ -352,23 +426,26 @@ fn on_smooth_surface(
 /// interpolation, the way to the world and the way back with an inverted matrix; at 10 m it is 0.08 mm.
 const OFFSET: f32 = 64.0 * f32::EPSILON;
 
+/// `extent`: no coordinate that goes into a position is larger; rounding errors are in proportion to it.
+#[inline(always)]
+fn offset_m(placed: &Placed, extent: Vec3A) -> f32 {
+    let m = &placed.world_from_object;
+    let extent = m.matrix3.abs() * extent + m.translation.abs();
+    OFFSET * extent.max_element()
+}
+
 #[inline(always)]
 fn into_world(ray: &Ray, placed: &Placed, local: &Local<'_>, matter: Matter) -> Point {
     let m = &placed.world_from_object;
-    // Normals transform with the inverse's transpose.
-    let normal_from_local = placed.object_from_world.matrix3.transpose();
     let towards_viewer = -ray.direction;
-    let geometric_normal = (normal_from_local * local.geometric_normal)
-        .try_normalize()
-        .unwrap_or_else(|| towards_viewer.normalize_or_zero());
-    let mut normal = (normal_from_local * local.normal).try_normalize().unwrap_or(geometric_normal);
+    let geometric_normal = local.unit_normal.unwrap_or_else(|| towards_viewer.normalize_or_zero());
+    let mut normal = unit_normal(placed, local.normal).unwrap_or(geometric_normal);
     let mut local_normal = local.normal;
     if normal.dot(geometric_normal) < 0.0 {
         normal = -normal;
         local_normal = -local_normal;
     }
-    let extent = m.matrix3.abs() * local.extent + m.translation.abs();
-    let outwards = geometric_normal * (OFFSET * extent.max_element());
+    let outwards = geometric_normal * local.offset_m;
     let position = m.transform_point3a(local.position);
     Point {
         position,

@@ -14,6 +14,9 @@ pub struct Ray {
 }
 
 impl Ray {
+    /// In the place of a ray that is not known yet.
+    pub(crate) const NONE: Ray = Ray { origin: Vec3A::ZERO, direction: Vec3A::ZERO };
+
     /// Whether traversal may be begun: all numbers finite and a direction to go.
     #[inline(always)]
     pub(crate) fn is_traceable(&self) -> bool {

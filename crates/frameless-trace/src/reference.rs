@@ -12,6 +12,7 @@ use crate::kernel::{Isa, Kernel, Pack, Portable, ShearRay};
 use crate::packet::{Packet, TOGETHER};
 use crate::ray::{Hit, Ray};
 use crate::test_scenes as scenes;
+use crate::top::Targets;
 use crate::traverse::Stack;
 
 pub(crate) fn ray(origin: Vec3, direction: Vec3) -> Ray {
@@ -351,10 +352,26 @@ fn portable_and_fastest_code_agree_bit_for_bit() {
     }
 }
 
+/// Neighbours: around one direction, from one point or to one, from hardly apart to far apart.
+fn neighbours(rng: &mut Rng, count: usize) -> Vec<Ray> {
+    let origin = 5.0 * rng.unit_f32() * scenes::unit(rng);
+    let target = 2.0 * rng.unit_f32() * scenes::unit(rng);
+    let spread = 0.1 * rng.unit_f32() * rng.unit_f32() * (target - origin).length();
+    let [from, to] = [[0.0, spread], [spread, 0.0], [spread, spread]][rng.below(3) as usize];
+    let off = |rng: &mut Rng, by: f32| by * scenes::unit(rng);
+    let near = |rng: &mut Rng| {
+        let origin = origin + off(rng, from);
+        ray(origin, target + off(rng, to) - origin)
+    };
+    (0..count).map(|_| near(rng)).collect()
+}
+
 #[test]
 fn rays_walked_together_find_what_each_finds_alone() {
     let mut scene = Scene::clone(&scenes::mixed());
     let soup = random_soup(&mut Rng::new(8), 2_000, 0.3);
+    // Twice, so that surfaces coincide.
+    scenes::add(&mut scene, Geometry::Mesh(soup.clone()), Transform::IDENTITY);
     scenes::add(&mut scene, Geometry::Mesh(soup), Transform::IDENTITY);
     // Its edges are met exactly.
     scenes::add(&mut scene, scenes::triangle_sphere(8, 12, 0), Transform::IDENTITY);
@@ -364,25 +381,39 @@ fn rays_walked_together_find_what_each_finds_alone() {
         let moment = world.moment(0.0);
         let (targets, mut stack) = (moment.targets(&world), Stack::new());
         let mut rng = Rng::new(13);
-        let (mut hits, mut together) = (0, 0);
-        for _ in 0..300 {
-            // Around one direction from one point, from hardly apart to far apart; some groups are not full.
-            let origin = 5.0 * rng.unit_f32() * scenes::unit(&mut rng);
-            let target = 2.0 * rng.unit_f32() * scenes::unit(&mut rng) - origin;
-            let spread = 0.1 * rng.unit_f32() * rng.unit_f32() * target.length();
+        let (mut hits, mut together, mut blocked, mut passed) = (0, 0, 0, 0);
+        for _ in 0..400 {
+            // Some groups are not full.
             let count = 1 + rng.below(70) as usize;
-            let rays: Vec<Ray> =
-                (0..count).map(|_| ray(origin, target + spread * scenes::unit(&mut rng))).collect();
+            let rays = neighbours(&mut rng, count);
+            // Whatever has been learned of others.
+            stack.worth = Default::default();
             let mut found = vec![None; count];
             targets.closest_of(&rays, &mut found, &mut stack);
             let alone: Vec<_> = rays.iter().map(|ray| targets.closest(ray, &mut stack)).collect();
             assert_eq!(found, alone);
             hits += found.iter().flatten().count();
-            let groups = rays.as_chunks::<TOGETHER>().0;
-            together +=
-                groups.iter().filter(|rays| Packet::new::<Portable>(rays).is_some()).count();
+            for rays in rays.chunks(TOGETHER) {
+                together += usize::from(Packet::new::<Portable>(rays, f32::MAX).is_some());
+                let t_max = [1.0, 0.6, f32::INFINITY][rng.below(3) as usize];
+                let known = targets.occluded_of(rays, t_max, &mut stack);
+                let rest = Targets { standing: None, ..targets };
+                for (index, ray) in rays.iter().enumerate() {
+                    let is_occluded = targets.occluded(ray, t_max, &mut stack);
+                    if known.blocked >> index & 1 != 0 {
+                        assert!(is_occluded, "{ray:?}");
+                        blocked += 1;
+                    } else if known.passed >> index & 1 != 0 {
+                        let by_rest = rest.occluded(ray, t_max, &mut stack);
+                        assert_eq!(is_occluded, by_rest, "{ray:?}");
+                        assert!(!(known.is_all && is_occluded), "{ray:?}");
+                        passed += 1;
+                    }
+                }
+            }
         }
-        assert!(hits > 2_000 && together > 100, "{hits} hits, {together} groups");
+        let enough = hits > 2_000 && together > 100 && blocked > 500 && passed > 500;
+        assert!(enough, "{hits} hits, {together} groups, {blocked} blocked, {passed} passed");
     }
 }
 

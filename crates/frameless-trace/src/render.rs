@@ -40,6 +40,9 @@ pub fn render(
     render_still(world, &still, pool, || ())
 }
 
+/// Side of the squares of pixels that are traced one after the other, so that neighbours are walked together.
+const BLOCK: u32 = 4;
+
 /// The mean of every pixel's samples. Row-major linear RGB. `row_done` is told of every finished row, by any thread.
 pub fn render_still(
     world: &World,
@@ -51,19 +54,40 @@ pub fn render_still(
     let moment = world.moment(still.secs);
     let camera = Camera::new(&still.view.at(world.scene(), moment.state()), size);
     let mut image = vec![[0.0; 3]; size.pixels()];
+    let numbers = (0..samples).map(|k| still.first_sample.wrapping_add(k));
     pool.install(|| {
-        let rows = image.par_chunks_mut(size.width as usize).zip(0..size.height);
-        rows.for_each_init(Stack::new, |stack, (row, y)| {
-            for (x, colour) in (0..).zip(row) {
-                let numbers = (0..samples).map(|k| still.first_sample.wrapping_add(k));
-                let requests = numbers.map(|n| Request::in_sequence(size.index(x, y), n));
-                let mut sum = Vec3::ZERO;
-                let add = |rgb: [f32; 3], _| sum += Vec3::from(rgb);
+        let bands = image.par_chunks_mut((BLOCK * size.width) as usize).enumerate();
+        bands.for_each_init(Stack::new, |stack, (index, band)| {
+            let (first_row, rows) = (index as u32 * BLOCK, band.len() as u32 / size.width);
+            for left in (0..size.width).step_by(BLOCK as usize) {
+                let pixels = block(left, size.width - left, rows);
+                let request = |(x, y)| {
+                    let pixel = size.index(x, first_row + y);
+                    numbers.clone().map(move |number| Request::in_sequence(pixel, number))
+                };
+                let requests = pixels.clone().flat_map(request);
+                let (mut sums, mut sum, mut left) = (pixels, Vec3::ZERO, samples);
+                let add = |rgb: [f32; 3], _| {
+                    sum += Vec3::from(rgb);
+                    left -= 1;
+                    if left == 0
+                        && let Some((x, y)) = sums.next()
+                    {
+                        band[size.index(x, y) as usize] = (sum / samples as f32).to_array();
+                        (sum, left) = (Vec3::ZERO, samples);
+                    }
+                };
                 world.samples((&moment, &camera), requests, &still.settings, stack, add);
-                *colour = (sum / samples as f32).to_array();
             }
-            row_done();
+            (0..rows).for_each(|_| row_done());
         });
     });
     image
+}
+
+/// Columns and rows of a block's pixels, along a Morton curve, as far as they are there.
+fn block(left: u32, width: u32, height: u32) -> impl Iterator<Item = (u32, u32)> + Clone {
+    let places = (0..BLOCK * BLOCK).map(|k| (k & 1 | k >> 1 & 2, k >> 1 & 1 | k >> 2 & 2));
+    let is_there = move |&(x, y): &(u32, u32)| x < width && y < height;
+    places.filter(is_there).map(move |(x, y)| (left + x, y))
 }

@@ -6,10 +6,11 @@ use std::sync::Arc;
 
 use frameless::{Answer, Batch, Request, Rng, Size, Surface, Time, Tracer};
 use frameless_scene::{
-    Animation, Channel, Geometry, Interpolation, Light, LightKind, Limits, Material, Projection,
-    Scene, Target, Transform, Values, View, frame_bounds, look_at,
+    AlphaMode, Animation, Channel, Filter, Geometry, Image, Interpolation, Layers, Light,
+    LightKind, Limits, Material, Minify, Projection, Scene, Target, Texture, TextureRef, Transform,
+    Values, View, Volume, Wrap, frame_bounds, look_at,
 };
-use glam::{Quat, Vec3};
+use glam::{Quat, Vec2, Vec3, Vec4};
 
 use crate::kernel::Isa;
 use crate::test_scenes::{self as scenes, CAMERA, SIZE};
@@ -341,6 +342,105 @@ fn any_number_of_threads_gives_the_same_answers_in_order() {
     for request in &one[5].requests {
         let fast = world.trace(&moment, &view, SIZE, request, &path);
         assert_eq!(fast, portable.trace(&there, &view, SIZE, request, &path));
+    }
+}
+
+/// Glass that absorbs, what blends and what is masked, single-sided walls seen from behind, mirrors, and something that moves before all of it.
+fn with_holes() -> Scene {
+    let mut scene = Scene::clone(&scenes::mixed());
+    let cut = {
+        scene.images.push(Image {
+            width: 4,
+            height: 4,
+            rgba: (0..16).map(|k| [200, 255, 90, if k % 3 == 0 { 0 } else { 160 }]).collect(),
+        });
+        let (wrap, filter) = ([Wrap::Repeat; 2], Filter::Linear);
+        scene.textures.push(Texture { image: 0, wrap, filter, minify: Minify::default() });
+        Some(TextureRef::plain(scene.textures.len() as u32 - 1))
+    };
+    let mut layers = Layers { transmission: 0.9, ..Layers::default() };
+    layers.volume = Some(Volume::attenuating(Vec3::new(0.5, 0.9, 0.7), 1.0));
+    let glass = Material { layers: Some(Box::new(layers)), ..Material::default() };
+    let veil = Material { base_color: Vec4::new(0.9, 0.4, 0.2, 0.5), ..Material::default() };
+    let materials = [
+        glass,
+        Material { alpha_mode: AlphaMode::Blend, double_sided: true, ..veil.clone() },
+        Material { alpha_mode: AlphaMode::Blend, base_color_texture: cut, ..veil.clone() },
+        Material { alpha_mode: AlphaMode::Mask { cutoff: 0.4 }, base_color_texture: cut, ..veil },
+    ];
+    for (k, material) in (0..).zip(materials) {
+        scene.materials.push(material);
+        let number = scene.materials.len() as u32 - 1;
+        let x = 1.3 * (k as f32 - 1.5);
+        let turned = Transform {
+            translation: Vec3::new(x, 0.3, 2.0),
+            rotation: Quat::from_rotation_x(1.2 + 0.4 * k as f32),
+            scale: Vec3::splat(0.7),
+        };
+        let geometry = match k {
+            0 => scenes::triangle_sphere(10, 14, number),
+            _ => scenes::floor(1.0, 0.0, number),
+        };
+        let Geometry::Mesh(mut mesh) = geometry else { unreachable!("both are meshes") };
+        mesh.uvs[0] = mesh.positions.iter().map(|p| Vec2::new(p.x, p.z) * 2.0).collect();
+        scenes::add(&mut scene, Geometry::Mesh(mesh), turned);
+    }
+    let ball = scenes::triangle_sphere(8, 9, 1);
+    let mover = scenes::add(&mut scene, ball, scenes::at(-1.0, 0.5, 1.0));
+    scene.animation = Animation {
+        duration_secs: 2.0,
+        channels: vec![Channel {
+            target: Target::Translation(scene.instances[mover as usize].node),
+            times: vec![0.0, 2.0],
+            values: Values::Vec3(vec![Vec3::new(-2.0, 0.5, 1.0), Vec3::new(2.0, 0.5, 1.0)]),
+            interpolation: Interpolation::Linear,
+        }],
+        ..Animation::default()
+    };
+    scene.check().unwrap();
+    scene
+}
+
+/// Whether neighbours are traced together or each of them alone is seen in nothing but time.
+#[test]
+fn samples_in_groups_are_what_each_is_alone() {
+    let mut subjects: Vec<(String, Scene)> =
+        vec![("mixed".into(), Scene::clone(&scenes::mixed())), ("holes".into(), with_holes())];
+    for name in ["orbit", "shadow", "mix"] {
+        subjects.push((name.into(), frameless_scene::builtin(name).expect("it is built in")));
+    }
+    if let Some(folder) = shared_scenes() {
+        let path = folder.join("architecture/DreamApartment.glb");
+        let apartment = frameless_scene::load(&path, &Limits::default()).expect("it can be read");
+        subjects.push(("apartment".into(), apartment));
+    }
+    let size = Size::new(150, 110);
+    let mut rng = Rng::new(21);
+    for (name, scene) in subjects {
+        let scene = Arc::new(scene);
+        let world = World::with_isa(scene.clone(), Isa::detect());
+        let portable = World::with_isa(scene, Isa::Portable);
+        for (secs, integrator) in [(0.3, Integrator::Direct), (1.1, Integrator::Path)] {
+            let moment = world.moment(secs);
+            let view = CAMERA.at(world.scene(), moment.state());
+            let settings = Settings { integrator, ..Settings::default() };
+            // A part of the picture, dense, across the borders of tiles; and some from everywhere.
+            let count = if integrator == Integrator::Path { 1000 } else { 4000 };
+            let request = |k: u32| {
+                let near = size.index(20 + rng.below(40), 10 + rng.below(30));
+                let pixel = if k.is_multiple_of(4) { rng.below(150 * 110) } else { near };
+                Request::in_sequence(pixel, rng.below(9))
+            };
+            let requests: Vec<Request> = (0..count).map(request).collect();
+            let (rgb, surfaces) = world.trace_all(&moment, &view, size, &requests, &settings);
+            for (k, request) in requests.iter().enumerate() {
+                let alone = world.trace(&moment, &view, size, request, &settings);
+                assert_eq!(alone, (rgb[k], surfaces[k]), "{name}: {request:?}");
+            }
+            let there = portable.moment(secs);
+            let same = portable.trace_all(&there, &view, size, &requests, &settings);
+            assert!(same == (rgb, surfaces), "{name}: portable code gives something else");
+        }
     }
 }
 

@@ -16,7 +16,7 @@ use glam::{Affine3A, Vec3};
 
 use crate::build::{Blas, corners_at, sane_box};
 use crate::kernel::{Kernel, ShearRay, SlabRay};
-use crate::packet::{Packet, TOGETHER, walk_together};
+use crate::packet::{Finds, Packet, walk_together};
 use crate::pages::prefer_large_pages;
 use crate::ray::{Hit, Ray};
 use crate::sift::Stops;
@@ -90,16 +90,16 @@ impl Standing {
         all.all(|(place, placed)| place.is_none_or(|place| place == placed.world_from_object))
     }
 
-    /// Brings `best` to the nearest hit of each ray of the packet; see [`walk_together`].
+    /// Tells `finds` what the packet's rays hit; see [`walk_together`].
     #[inline(always)]
     pub(crate) fn walk_together<K: Kernel>(
         &self,
         packet: &mut Packet,
-        best: &mut [Hit; TOGETHER],
+        finds: &mut impl Finds,
         stack: &mut Stack,
     ) -> [u32; 2] {
         let Blas { nodes, packs, .. } = &self.tree;
-        walk_together::<K>((nodes, packs), packet, best, stack, |member| {
+        walk_together::<K>((nodes, packs), packet, finds, stack, |member| {
             let Member { instance, primitive } = self.members[member as usize];
             (instance, primitive)
         })

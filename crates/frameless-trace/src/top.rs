@@ -14,7 +14,7 @@ use crate::deforming::Deforming;
 #[cfg(target_arch = "x86_64")]
 use crate::kernel::avx2;
 use crate::kernel::{Isa, Kernel, Lanes, Pack, Portable, ShearRay, SlabRay};
-use crate::packet::{Packet, TOGETHER, Worth};
+use crate::packet::{Any, Nearest, Packet, TOGETHER};
 use crate::ray::{Hit, Ray};
 use crate::sift::{NoSieve, Stops};
 use crate::sphere;
@@ -207,19 +207,23 @@ impl Targets<'_> {
 
     /// The same of many rays: neighbours that go much the same way are walked together, and `found` says of each what is found for it alone.
     pub(crate) fn closest_of(&self, rays: &[Ray], found: &mut [Option<Hit>], stack: &mut Stack) {
-        let (groups, rest) = rays.as_chunks::<TOGETHER>();
-        let mut worth = Worth::default();
-        let (found, rest_found) = found.split_at_mut(groups.len() * TOGETHER);
-        for (rays, found) in groups.iter().zip(found.chunks_mut(TOGETHER)) {
-            let group = Group { targets: self, rays, found, worth: &mut worth, stack };
+        for (rays, found) in rays.chunks(TOGETHER).zip(found.chunks_mut(TOGETHER)) {
+            let group = Group { targets: self, rays, found, stack };
             match self.isa {
                 Isa::Portable => group.with::<Portable>(),
                 #[cfg(target_arch = "x86_64")]
                 Isa::Avx2(proof) => avx2::with(proof, group),
             }
         }
-        for (ray, found) in rest.iter().zip(rest_found) {
-            *found = self.closest(ray, stack);
+    }
+
+    /// Which of at most [`TOGETHER`] rays hit anything at 0 < t < t_max.
+    pub(crate) fn occluded_of(&self, rays: &[Ray], t_max: f32, stack: &mut Stack) -> Occluded {
+        let group = Shadows { targets: self, rays, t_max, stack };
+        match self.isa {
+            Isa::Portable => group.with::<Portable>(),
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx2(proof) => avx2::with(proof, group),
         }
     }
 
@@ -247,12 +251,22 @@ impl Targets<'_> {
     }
 }
 
+/// What is known of rays to much the same place. Bits by ray; of the others nothing is known.
+pub(crate) struct Occluded {
+    /// Those that are stopped.
+    pub(crate) blocked: u32,
+    /// Those that nothing stops that stands.
+    pub(crate) passed: u32,
+    /// Whether nothing else is on their way.
+    pub(crate) is_all: bool,
+}
+
 /// Neighbours' ways through everything.
 struct Group<'a> {
     targets: &'a Targets<'a>,
-    rays: &'a [Ray; TOGETHER],
+    /// At most [`TOGETHER`].
+    rays: &'a [Ray],
     found: &'a mut [Option<Hit>],
-    worth: &'a mut Worth,
     stack: &'a mut Stack,
 }
 
@@ -268,24 +282,63 @@ impl avx2::Task for Group<'_> {
 impl Group<'_> {
     #[inline(always)]
     fn with<K: Kernel>(self) {
-        let Group { targets, rays, found, worth, stack } = self;
+        let Group { targets, rays, found, stack } = self;
         let mut best = [Hit::NONE; TOGETHER];
-        let mut standing = targets.standing;
+        let (mut standing, mut is_done) = (targets.standing, false);
         if let Some(tree) = standing
-            && worth.is_worth_trying()
-            && let Some(mut packet) = Packet::new::<K>(rays)
+            && let Some(mut packet) = Packet::worth::<K>(rays, f32::MAX, &mut stack.worth[0])
         {
-            worth.learn(tree.walk_together::<K>(&mut packet, &mut best, stack));
+            let met = tree.walk_together::<K>(&mut packet, &mut Nearest(&mut best), stack);
+            stack.worth[0].learn(met);
             standing = None;
+            is_done = !packet.may_meet::<K>(&targets.top.nodes[0]);
         }
+        let targets = &Targets { standing, ..*targets };
         for ((ray, found), none) in rays.iter().zip(found).zip(best) {
-            let targets = &Targets { standing, ..*targets };
-            *found = if standing.is_none() && targets.top.leaves.is_empty() {
+            *found = if is_done {
                 none.found()
             } else {
                 Walk::<_, false> { targets, ray, none, sieve: NoSieve, stack }.with::<K>()
             };
         }
+    }
+}
+
+/// Neighbours' ways to much the same place.
+struct Shadows<'a> {
+    targets: &'a Targets<'a>,
+    rays: &'a [Ray],
+    t_max: f32,
+    stack: &'a mut Stack,
+}
+
+#[cfg(target_arch = "x86_64")]
+impl avx2::Task for Shadows<'_> {
+    type Output = Occluded;
+    #[inline(always)]
+    fn run(self) -> Occluded {
+        self.with::<avx2::Avx2>()
+    }
+}
+
+impl Shadows<'_> {
+    #[inline(always)]
+    fn with<K: Kernel>(self) -> Occluded {
+        let Shadows { targets, rays, t_max, stack } = self;
+        let until = Hit::none_before(t_max).t;
+        let mut known = Occluded { blocked: 0, passed: 0, is_all: false };
+        if let Some(tree) = targets.standing
+            && let Some(mut packet) = Packet::worth::<K>(rays, until, &mut stack.worth[1])
+        {
+            let asks = |instance: u32| targets.placed[instance as usize].has_holes;
+            let mut any = Any { asks, blocked: 0, doubtful: 0 };
+            let met = tree.walk_together::<K>(&mut packet, &mut any, stack);
+            stack.worth[1].learn(met);
+            known.blocked = any.blocked;
+            known.passed = !(any.blocked | any.doubtful);
+            known.is_all = !packet.may_meet::<K>(&targets.top.nodes[0]);
+        }
+        known
     }
 }
 

@@ -1,6 +1,7 @@
 //! The walk through a wide BVH, nearest box first.
 
 use crate::kernel::{Kernel, SLAB_MARGIN, SlabRay};
+use crate::packet::Worth;
 use crate::ray::Hit;
 use crate::wide::{Child, Node};
 
@@ -11,12 +12,15 @@ pub(crate) const STACK_PER_TREE: usize = 192;
 /// Room for two trees, and a power of two, so that an index can be kept inside without asking.
 const ENTRIES: usize = (2 * STACK_PER_TREE).next_power_of_two();
 
-/// Nodes still to be visited: the top level's and, above them, one instance's.
+/// Nodes still to be visited: the top level's and, above them, one instance's. And what the thread whose it is has learned of walking rays
+/// together, which no result depends on.
 pub(crate) struct Stack {
     entries: [Entry; ENTRIES],
     /// Per entry of a packet: eight times its parent's index, plus its slot there.
     from: [u32; ENTRIES],
     length: usize,
+    /// Of rays that look for what is nearest, and of those that look for anything.
+    pub(crate) worth: [Worth; 2],
 }
 
 /// A node and where the ray enters it, in one number that is larger the farther away that is: bits of floats that are not negative
@@ -47,7 +51,8 @@ impl Entry {
 
 impl Stack {
     pub(crate) fn new() -> Stack {
-        Stack { entries: [Entry::ROOT; ENTRIES], from: [0; ENTRIES], length: 0 }
+        let worth = [Worth::default(); 2];
+        Stack { entries: [Entry::ROOT; ENTRIES], from: [0; ENTRIES], length: 0, worth }
     }
 
     #[inline(always)]
