@@ -2,7 +2,7 @@
 //!
 //! The display's rate where both are cheap. Where painting is not (software rendering on few cores takes 10 ms and
 //! more), a fixed share of one core: what the window takes, the picture loses. Where making the picture of the samples is
-//! not, a fixed share of the render loop's time: no samples are chosen meanwhile, and a slow refresh should lower the rate of
+//! not, a fixed share of the render loop's time: hardly any samples are chosen meanwhile, and a slow refresh should lower the rate of
 //! pictures rather than that of samples. An answer to somebody who has just done something is made at once, on credit: what
 //! rest that costs the samples is owed, and once too much is owed the next picture waits.
 
@@ -17,8 +17,10 @@ pub struct Pace {
     // Until when the samples would have the loop for themselves if nothing were on credit.
     owed_until: Time,
     paint_secs: f64,
-    refresh_secs: f64,
+    // Somebody waits for the next picture.
     is_hurried: bool,
+    // Somebody waits for the one that is being made.
+    is_answer: bool,
     steered_until: Time,
 }
 
@@ -30,8 +32,6 @@ const LONGEST_SECS: f64 = 1.0 / 20.0;
 const PAINT_SHARE: f64 = 0.25;
 // Of the loop's time, for making pictures. More starves the samples of which they are made.
 const REFRESH_SHARE: f64 = 0.42;
-// The same of pictures that are made beside the loop: samples have some of the machine meanwhile.
-const BESIDE_SHARE: f64 = 0.6;
 // The same of those that nobody waits for while somebody steers: an answer has to wait for the picture that is being made. The
 // smaller one as long as that leaves 20 Hz.
 const STEERED_SHARES: [f64; 2] = [1.0 / 4.0, 1.0 / 3.0];
@@ -43,8 +43,6 @@ const HURRIED_SHARE: f64 = 0.5;
 const CREDIT_SECS: f64 = 0.04;
 // Whatever a picture costs, the next comes after this at the latest.
 const LONGEST_REST_SECS: f64 = 1.0;
-// Samples that come later than this are old before they are shown.
-const MOST_AHEAD_SECS: f64 = 0.015;
 // Of the newest paint in the learned cost: one slow paint is no reason to slow down.
 const LEARNING_RATE: f64 = 0.1;
 
@@ -56,11 +54,10 @@ impl Pace {
         }
     }
 
-    /// Told when a picture is ready, and what making it cost in seconds of the render loop. The samples get their share before
+    /// Told when a picture is ready, and how many seconds it took. The samples get their share before
     /// the next one: at once and not on average, since the first pictures of a large window cost most.
     pub fn made(&mut self, now: Time, refresh_secs: f64) {
-        self.refresh_secs = refresh_secs;
-        if std::mem::take(&mut self.is_hurried) {
+        if std::mem::take(&mut self.is_answer) {
             self.steered_until = Time::from_secs(now.secs() + STEERED_SECS);
         }
         let rest_secs = |share: f64| refresh_secs * (1.0 / share - 1.0);
@@ -79,19 +76,10 @@ impl Pace {
         let on_credit = Time::from_secs(self.owed_until.secs() - CREDIT_SECS);
         self.soonest = self.soonest.max(on_credit);
         self.due = self.due.max(after(now, unhurried_secs));
-    }
-
-    /// The same of a picture that was made beside the loop, in so many seconds.
-    pub fn made_beside(&mut self, now: Time, secs: f64) {
-        let rest_secs = secs * (1.0 / BESIDE_SHARE - 1.0);
-        self.due = self.due.max(Time::from_secs(now.secs() + rest_secs.min(LONGEST_REST_SECS)));
-        self.soonest = self.soonest.max(now);
-        self.owed_until = self.owed_until.max(now);
-    }
-
-    /// Whether somebody waits for the next picture.
-    pub fn is_hurried(&self) -> bool {
-        self.is_hurried
+        if self.is_hurried {
+            // By what was done while it was made.
+            self.hurry();
+        }
     }
 
     fn is_steered(&self, now: Time) -> bool {
@@ -104,20 +92,12 @@ impl Pace {
         self.is_hurried = true;
     }
 
-    /// For how many seconds the renderer should have something to do while the next picture is made: as long as the last one took; if
-    /// somebody waits for it, or might before it is made, not at all: it would take longer.
-    pub fn ahead_secs(&self, now: Time) -> f64 {
-        if self.is_hurried || self.is_steered(now) {
-            return 0.0;
-        }
-        self.refresh_secs.min(MOST_AHEAD_SECS)
-    }
-
     /// Whether a picture is due; if so, the next one is due an interval later.
     pub fn is_due(&mut self, now: Time) -> bool {
         if now < self.due {
             return false;
         }
+        self.is_answer = std::mem::take(&mut self.is_hurried);
         // What was missed is not made up for.
         self.due = Time::from_secs(now.secs() + self.interval_secs());
         self.soonest = Time::from_secs(now.secs() + SHORTEST_SECS);
@@ -225,36 +205,26 @@ mod tests {
     }
 
     #[test]
-    fn the_renderer_has_work_while_a_picture_is_made_that_nobody_waits_for() {
-        let mut pace = Pace::default();
-        assert_eq!(pace.ahead_secs(ms(990)), 0.0, "nobody knows how long it will take");
-        pace.made(ms(1000), 0.008);
-        assert_eq!(pace.ahead_secs(ms(1020)), 0.008);
-        pace.hurry();
-        assert_eq!(pace.ahead_secs(ms(1040)), 0.0, "whose answer must not wait for others");
-        pace.made(ms(1050), 3.0);
-        assert_eq!(pace.ahead_secs(ms(1060)), 0.0, "who has just done something will again");
-        assert_eq!(pace.ahead_secs(ms(1600)), MOST_AHEAD_SECS);
-    }
-
-    #[test]
-    fn pictures_beside_the_loop_leave_the_samples_their_share() {
-        let mut pace = Pace::default();
-        assert!(pace.is_due(ms(1000)));
-        pace.made_beside(ms(1060), 0.06);
-        assert_eq!((1060..2000).find(|&now| pace.is_due(ms(now))), Some(1100));
-        pace.made_beside(ms(9000), 60.0);
-        assert!(pace.is_due(ms(10_000)));
+    fn what_is_done_while_a_picture_is_made_is_answered_by_the_next() {
+        let rest_ms = |acts_at: Option<u64>| {
+            let mut pace = Pace::default();
+            assert!(pace.is_due(ms(1000)));
+            acts_at.inspect(|_| pace.hurry());
+            pace.made(ms(1020), 0.02);
+            (1020..2000).find(|&now| pace.is_due(ms(now))).expect("due again") - 1020
+        };
+        assert_eq!(rest_ms(None), 28);
+        assert_eq!(rest_ms(Some(1010)), 0);
     }
 
     #[test]
     fn while_somebody_steers_the_loop_is_freer_for_the_next_answer() {
         let rest_ms = |steers: bool, takes_ms: u64| {
             let mut pace = Pace::default();
-            assert!(pace.is_due(ms(1000)));
             if steers {
                 pace.hurry();
             }
+            assert!(pace.is_due(ms(1000)));
             let made = 1000 + takes_ms;
             pace.made(ms(made), 1e-3 * takes_ms as f64);
             (made..2000).find(|&now| pace.is_due(ms(now))).expect("due again") - made

@@ -121,8 +121,8 @@ impl<T: Tracer> Tracer for Counted<T> {
         self.tracer.samples_at_once()
     }
 
-    fn spare_threads(&mut self, threads: usize) {
-        self.tracer.spare_threads(threads);
+    fn spare_threads(&mut self, threads: usize) -> bool {
+        self.tracer.spare_threads(threads)
     }
 
     fn pose(&mut self, scene_secs: f64, size: Size, pose: &mut Pose) -> bool {

@@ -1,6 +1,7 @@
 //! The render loop in a thread of its own: neither the window nor the loop ever waits for the other.
 
 use std::io;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::{Builder, JoinHandle};
 
@@ -15,11 +16,18 @@ pub const LOOP_THREAD: &str = "render loop";
 
 /// A running loop. Ends when dropped.
 pub struct RenderThread<W> {
-    // Taken on drop: that the channel is closed is the sign to end.
-    commands: Option<Sender<Command<W>>>,
+    to_loop: Sender<Heard<W>>,
     reports: Receiver<Report>,
     steering: Option<Steering>,
     thread: Option<JoinHandle<()>>,
+}
+
+/// What the loop is told.
+enum Heard<W> {
+    Command(Command<W>),
+    /// The picture that was begun then is ready, and nothing is left to be done for it.
+    PictureEnds(Time),
+    End,
 }
 
 /// The loop has ended, which it does by itself only when the renderer panics.
@@ -27,21 +35,27 @@ pub struct RenderThread<W> {
 pub struct Ended;
 
 impl<W: Send + 'static> RenderThread<W> {
-    /// Starts the loop. `wake` is called after every report.
+    /// Starts the loop. `wake` is called after every report, in the thread that it is of.
     ///
     /// # Errors
     /// If the system has no thread left.
     pub fn start<S: Stage<World = W> + Send + 'static>(
         session: Session<S>,
-        wake: impl Fn() + Send + 'static,
+        wake: impl Fn() + Send + Sync + 'static,
     ) -> io::Result<RenderThread<W>> {
-        let (to_loop, commands) = channel();
+        let (to_loop, heard) = channel();
         let (to_window, reports) = channel();
         let steering = session.steering();
+        let to_itself = to_loop.clone();
+        // Sending fails once the window is gone; then the loop is told to end, too.
+        let report = move |report| {
+            to_window.send(report).ok();
+            wake();
+        };
         let thread = Builder::new()
             .name(LOOP_THREAD.to_owned())
-            .spawn(move || run(session, &commands, &to_window, wake))?;
-        Ok(RenderThread { commands: Some(to_loop), reports, steering, thread: Some(thread) })
+            .spawn(move || run(session, &heard, &to_itself, &Arc::new(report)))?;
+        Ok(RenderThread { to_loop, reports, steering, thread: Some(thread) })
     }
 
     /// Ask for something. Lost if the loop has ended, which [`RenderThread::report`] says.
@@ -50,9 +64,7 @@ impl<W: Send + 'static> RenderThread<W> {
         if let (Command::View(ViewChoice::Free(view)), Some(steer)) = (&command, &self.steering) {
             steer(*view);
         }
-        if let Some(commands) = &self.commands {
-            commands.send(command).ok();
-        }
+        self.to_loop.send(Heard::Command(command)).ok();
     }
 
     /// What the loop has to say, if anything.
@@ -70,7 +82,7 @@ impl<W: Send + 'static> RenderThread<W> {
 
 impl<W> Drop for RenderThread<W> {
     fn drop(&mut self) {
-        self.commands = None;
+        self.to_loop.send(Heard::End).ok();
         if let Some(thread) = self.thread.take() {
             // A panic in there has been printed already, and the window is closing.
             thread.join().ok();
@@ -83,44 +95,55 @@ const SECS_BETWEEN_ERRORS: f64 = 2.0;
 
 fn run<S: Stage>(
     mut session: Session<S>,
-    commands: &Receiver<Command<S::World>>,
-    reports: &Sender<Report>,
-    wake: impl Fn(),
+    heard: &Receiver<Heard<S::World>>,
+    to_itself: &Sender<Heard<S::World>>,
+    report: &Arc<impl Fn(Report) + Send + Sync + 'static>,
 ) {
     let mut pace = Pace::default();
     let mut wanted = None;
     let mut rests = false;
     let mut next_error = Time::ZERO;
-    // Sending fails once the window is gone; then the channel of commands is closed, too.
-    let report = |report| {
-        reports.send(report).ok();
-        wake();
-    };
+    // Since when a picture is being made beside the loop.
+    let mut begun = None;
     loop {
         // Of the sizes that a window takes on while its border is dragged only the last matters, and each would cost a refresh; of
         // settings, too, and each may cost a sampler.
         let (mut size, mut settings) = (None, None);
+        // Only for the first that is heard: it is answered at once.
+        let mut pause = session.pause();
         loop {
-            let next = match rests {
-                true => commands.recv().map_err(|_| TryRecvError::Disconnected),
-                false => commands.try_recv(),
+            let pause = std::mem::take(&mut pause);
+            let next = match (rests, pause.is_zero()) {
+                (true, _) => heard.recv().map_err(|_| TryRecvError::Disconnected),
+                (false, false) => heard.recv_timeout(pause).map_err(|_| TryRecvError::Empty),
+                (false, true) => heard.try_recv(),
             };
-            match next {
-                Ok(Command::Rest(on)) => rests = on,
-                Ok(Command::Size(wanted)) => size = Some(wanted),
-                Ok(Command::Settings(wanted)) => settings = Some(wanted),
-                Ok(Command::WantPicture { memory, paint_secs }) => {
+            let command = match next {
+                Ok(Heard::Command(command)) => command,
+                Ok(Heard::PictureEnds(of)) => {
+                    // Not if the loop has found out by itself, and has begun another.
+                    if begun == Some(of) {
+                        session.end_picture();
+                    }
+                    continue;
+                }
+                Err(TryRecvError::Empty) => break,
+                Ok(Heard::End) | Err(TryRecvError::Disconnected) => return,
+            };
+            match command {
+                Command::Rest(on) => rests = on,
+                Command::Size(wanted) => size = Some(wanted),
+                Command::Settings(wanted) => settings = Some(wanted),
+                Command::WantPicture { memory, paint_secs } => {
                     pace.painted(paint_secs);
                     wanted = Some(memory);
                 }
-                Ok(command) => {
+                command => {
                     if let Command::Mark(_) = command {
                         pace.hurry();
                     }
                     session.apply(command);
                 }
-                Err(TryRecvError::Empty) => break,
-                Err(TryRecvError::Disconnected) => return,
             }
         }
         for command in size.map(Command::Size).into_iter().chain(settings.map(Command::Settings)) {
@@ -133,27 +156,32 @@ fn run<S: Stage>(
             next_error = Time::from_secs(session.now().secs() + SECS_BETWEEN_ERRORS);
             report(Report::Error(trouble));
         }
-        if let Some((picture, secs)) = session.take_picture() {
-            pace.made_beside(session.now(), secs);
-            report(Report::Picture(picture));
+        if session.is_making() {
+            continue;
         }
-        let may = wanted.is_some() && session.is_worth_showing() && !session.is_making();
-        if may && pace.is_due(session.now()) {
+        if let Some(begun) = begun.take() {
+            let now = session.now();
+            pace.made(now, now.secs_since(begun));
+        }
+        if session.is_worth_showing()
+            && let Some(memory) = wanted.take_if(|_| pace.is_due(session.now()))
+        {
             let begin = session.now();
-            let memory = wanted.take().unwrap_or_default();
-            // Who waits for an answer gets it from all threads.
-            let memory = match pace.is_hurried() {
-                true => memory,
-                false => match session.begin_picture(memory) {
-                    Ok(()) => continue,
-                    Err(memory) => memory,
-                },
-            };
-            session.work_ahead(pace.ahead_secs(begin));
-            let picture = session.picture(memory);
-            let ready = session.now();
-            pace.made(ready, ready.secs_since(begin));
-            report(Report::Picture(picture));
+            if session.can_begin_picture() {
+                let (show, end) = (Arc::clone(report), to_itself.clone());
+                session.begin_picture(
+                    memory,
+                    move |picture| show(Report::Picture(picture)),
+                    // The loop may have ended.
+                    move || drop(end.send(Heard::PictureEnds(begin))),
+                );
+                begun = Some(begin);
+            } else {
+                let picture = session.picture(memory);
+                let ready = session.now();
+                pace.made(ready, ready.secs_since(begin));
+                report(Report::Picture(picture));
+            }
         }
     }
 }

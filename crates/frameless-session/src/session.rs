@@ -2,11 +2,10 @@
 //!
 //! No thread and no window here: see `render_thread.rs`.
 
-use std::sync::mpsc::{Receiver, channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use frameless::{
-    AdaptiveOptions, Clock, Display, Engine, EngineError, ReconstructionKind, Sampler, SamplerKind,
+    AdaptiveOptions, Canvas, Clock, Display, Engine, EngineError, ReconstructionKind, Sampler, SamplerKind,
     Size, Time, Tracer,
 };
 use frameless_scene::View;
@@ -55,19 +54,6 @@ pub struct Session<S> {
     heat_maps: HeatMaps,
     throughput: Throughput,
     mark: u64,
-    is_beside: bool,
-    under_way: Option<Receiver<Made>>,
-}
-
-/// A picture that was made beside the loop.
-struct Made {
-    size: Size,
-    rgba: Vec<[u8; 4]>,
-    mark: u64,
-    scene_secs: f64,
-    ages: Ages,
-    /// What making it took.
-    secs: f64,
 }
 
 impl<S: Stage> Session<S> {
@@ -90,8 +76,6 @@ impl<S: Stage> Session<S> {
             heat_maps,
             throughput,
             mark: 0,
-            is_beside: false,
-            under_way: None,
         }
     }
 
@@ -111,12 +95,6 @@ impl<S: Stage> Session<S> {
         self
     }
 
-    /// Pictures are made beside the loop wherever they can be: samples show input meanwhile, for which a picture takes longer.
-    pub fn with_pictures_beside(mut self) -> Self {
-        self.is_beside = true;
-        self
-    }
-
     /// See [`Stage::steering`].
     pub fn steering(&self) -> Option<Steering> {
         self.engine.tracer().tracer.steering()
@@ -130,6 +108,11 @@ impl<S: Stage> Session<S> {
             self.heat_maps.note_changes(size, self.engine.observations());
         }
         outcome
+    }
+
+    /// See [`Engine::pause`].
+    pub fn pause(&self) -> Duration {
+        self.engine.pause()
     }
 
     /// The present time of the engine's clock.
@@ -222,11 +205,6 @@ impl<S: Stage> Session<S> {
         }
     }
 
-    /// See [`Engine::work_ahead`].
-    pub fn work_ahead(&mut self, secs: f64) {
-        self.engine.work_ahead(secs);
-    }
-
     /// See [`Stage::trouble`].
     pub fn trouble(&mut self) -> Option<String> {
         self.engine.tracer_mut().tracer.trouble()
@@ -239,62 +217,43 @@ impl<S: Stage> Session<S> {
         self.engine.counters().kept >= enough || self.now() >= FIRST_PICTURE_AT_LATEST
     }
 
-    /// Begins to make the picture of now beside the loop, in reused memory, for [`Session::take_picture`].
+    /// Whether [`Session::begin_picture`] is possible now: where it [is](Engine::can_refresh_beside) at all, and no overlay is shown, which is drawn of
+    /// what only the loop knows. Elsewhere [`Session::picture`] makes it at once.
+    pub fn can_begin_picture(&self) -> bool {
+        self.settings.overlay == Overlay::None && self.engine.can_refresh_beside()
+    }
+
+    /// Begins to make the picture of now beside the loop, in reused memory. `show` is given it when it is ready, and `end` is called when
+    /// [`Session::end_picture`] will not have to wait any longer, both in a thread of the picture's.
     ///
-    /// # Errors
-    /// Gives the memory back if that is not possible, or not wanted: then [`Session::picture`] makes it at once.
-    pub fn begin_picture(&mut self, memory: Vec<[u8; 4]>) -> Result<(), Vec<[u8; 4]>> {
-        let is_reprojected =
-            matches!(self.settings.reconstruction, ReconstructionKind::Reproject(_));
-        if !self.is_beside || !is_reprojected || self.is_making() {
-            return Err(memory);
-        }
-        let (begin, size, mark) = (self.engine.now(), self.engine.canvas().size(), self.mark);
-        let scene_secs = self.engine.timeline().scene_secs(begin);
-        let (sender, receiver) = channel();
-        let clock = self.engine.clock().clone();
-        // Given to the picture's thread, and back if there is none.
-        let shared = Arc::new(Mutex::new(memory));
-        let lent = Arc::clone(&shared);
-        let has_begun = self.engine.refresh_beside(begin, move |picture, canvas| {
-            let mut rgba = std::mem::take(&mut *lock(&lent));
+    /// # Panics
+    /// If it is [not possible](Session::can_begin_picture), or the system has no thread left.
+    pub fn begin_picture(
+        &mut self,
+        memory: Vec<[u8; 4]>,
+        show: impl FnOnce(Picture) + Send + 'static,
+        end: impl FnOnce() + Send + 'static,
+    ) {
+        let now = self.engine.now();
+        let (size, mark, status) = (self.size(), self.mark, self.status(now));
+        let show = move |picture: &[[f32; 3]], canvas: &Canvas| {
+            let mut rgba = memory;
             rgba.clear();
             rgba.extend(picture.iter().map(|&colour| rgba8(colour)));
-            let ages = shown::ages(canvas, begin);
-            let secs = clock.now().secs_since(begin);
-            // Nobody waits for it any more if the session is gone.
-            sender.send(Made { size, rgba, mark, scene_secs, ages, secs }).ok();
-        });
-        if !has_begun {
-            return Err(std::mem::take(&mut *lock(&shared)));
-        }
-        self.under_way = Some(receiver);
-        Ok(())
-    }
-
-    /// Whether a picture is being made beside the loop, or has been and is to be taken.
-    pub fn is_making(&self) -> bool {
-        self.under_way.is_some() || self.engine.is_refreshing()
-    }
-
-    /// The picture that was made beside the loop, when it is ready, and what making it took in seconds.
-    pub fn take_picture(&mut self) -> Option<(Picture, f64)> {
-        let made = self.under_way.as_ref()?.try_recv().ok()?;
-        self.under_way = None;
-        let Made { size, mut rgba, mark, scene_secs, ages, secs } = made;
-        let is_same_size = size == self.engine.canvas().size();
-        let overlay = is_same_size
-            .then(|| self.heat_maps.draw(self.settings.overlay, &mut self.engine, &mut rgba))
-            .flatten();
-        let throughput = self.throughput.update(self.engine.now(), self.engine.counters().kept);
-        let status = Status {
-            scene_secs,
-            samples_per_sec: throughput.samples_per_sec,
-            pictures_per_sec: throughput.pictures_per_sec,
-            ages,
-            overlay,
+            let status = Status { ages: shown::ages(canvas, now), ..status };
+            show(Picture { size, rgba, mark, status });
         };
-        Some((Picture { size, rgba, mark, status }, secs))
+        self.engine.refresh_beside(now, show, end);
+    }
+
+    /// Whether a picture is being made beside the loop.
+    pub fn is_making(&self) -> bool {
+        self.engine.is_refreshing()
+    }
+
+    /// Waits for the picture that is being made beside the loop, if one is.
+    pub fn end_picture(&mut self) {
+        self.engine.end_refresh();
     }
 
     /// The picture now, in reused memory.
@@ -313,15 +272,21 @@ impl<S: Stage> Session<S> {
             }
         }
         let overlay = self.heat_maps.draw(self.settings.overlay, &mut self.engine, &mut rgba);
+        let ages = shown::ages(self.engine.canvas(), now);
+        let status = Status { ages, overlay, ..self.status(now) };
+        Picture { size: self.size(), rgba, mark: self.mark, status }
+    }
+
+    /// What is known before the picture is made.
+    fn status(&mut self, now: Time) -> Status {
         let throughput = self.throughput.update(now, self.engine.counters().kept);
-        let status = Status {
+        Status {
             scene_secs: self.engine.timeline().scene_secs(now),
             samples_per_sec: throughput.samples_per_sec,
             pictures_per_sec: throughput.pictures_per_sec,
-            ages: shown::ages(self.engine.canvas(), now),
-            overlay,
-        };
-        Picture { size: self.engine.canvas().size(), rgba, mark: self.mark, status }
+            ages: Ages::default(),
+            overlay: None,
+        }
     }
 }
 
@@ -331,10 +296,6 @@ const MOST_REFRESH_THREADS: usize = 8;
 const PIXELS_PER_FIRST_SAMPLE: u64 = 64;
 // For renderers that need longer.
 const FIRST_PICTURE_AT_LATEST: Time = Time(500_000_000);
-
-fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
-    shared.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 /// 8 bits per channel of a display-referred colour, with alpha 255.
 fn rgba8(colour: [f32; 3]) -> [u8; 4] {
@@ -371,6 +332,8 @@ impl Throughput {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::mpsc::channel;
+
     use frameless::{SamplerKind, ToneMap};
 
     use super::*;
@@ -433,53 +396,53 @@ mod tests {
         assert_eq!(session.engine.tracer().tracer.view, ViewChoice::Camera(1));
     }
 
-    /// A session with pictures beside the loop, one of which has been made at once.
-    fn session_beside(kind: ReconstructionKind) -> Session<Plain> {
-        let settings = Settings {
-            sampler: SamplerKind::Permutation,
-            reconstruction: kind,
-            tone_map: ToneMap::None,
-            ..Settings::default()
-        };
+    /// A session on the real clock, with every pixel traced and one picture made.
+    fn real_session(reconstruction: ReconstructionKind) -> Session<Plain> {
+        let (sampler, tone_map) = (SamplerKind::Permutation, ToneMap::None);
+        let settings = Settings { sampler, reconstruction, tone_map, ..Settings::default() };
         let (size, plain) = (Size::new(40, 30), Plain::new(1.0));
-        let session = Session::new(size, Clock::simulated(100_000.0), settings, 1, plain);
-        let mut session = session.with_pictures_beside();
-        run(&mut session, 0.1);
-        assert!(session.begin_picture(Vec::new()).is_err(), "the first picture of a size");
-        session.picture(Vec::new());
+        let mut session = Session::new(size, Clock::real(), settings, 1, plain);
+        assert!(!session.can_begin_picture(), "the first picture of a size");
+        while session.picture(Vec::new()).status.ages.unknown > 0 {
+            session.step().unwrap();
+        }
         session
     }
 
     #[test]
     fn a_picture_made_beside_the_loop_is_the_picture() {
-        let mut session = session_beside(ReconstructionKind::REPROJECT);
+        let mut session = real_session(ReconstructionKind::REPROJECT);
         session.apply(Command::Mark(5));
-        session.begin_picture(vec![[7; 4]; 3]).unwrap();
-        assert!(session.is_making());
-        assert!(session.begin_picture(vec![[7; 4]]).is_err_and(|memory| memory == [[7; 4]]));
+        let (shown, made) = channel();
+        let ended = shown.clone();
+        session.begin_picture(
+            vec![[7; 4]; 3],
+            move |picture| shown.send(Some(picture)).unwrap(),
+            move || ended.send(None).unwrap(),
+        );
+        assert!(session.is_making() && !session.can_begin_picture(), "one at a time");
         session.apply(Command::Mark(6));
-        let (picture, secs) = loop {
-            session.step().unwrap();
-            if let Some(made) = session.take_picture() {
-                break made;
-            }
-        };
+        let picture = made.recv().unwrap().expect("shown first");
         assert_eq!((picture.size, picture.mark), (session.size(), 5), "marks after it began");
         assert!(picture.rgba.iter().all(|&pixel| pixel == [255; 4]));
         assert_eq!(picture.status.ages.unknown, 0);
-        assert!(secs >= 0.0);
-        while session.is_making() {
-            session.step().unwrap();
-        }
-        session.begin_picture(Vec::new()).unwrap();
+        assert!(made.recv().unwrap().is_none(), "the end");
+        session.end_picture();
+        assert!(!session.is_making() && session.can_begin_picture());
     }
 
     #[test]
-    fn pictures_of_the_canvas_are_not_made_beside_the_loop() {
+    fn what_is_made_of_the_canvas_or_of_the_loops_knowledge_is_not_made_beside_it() {
         for kind in [ReconstructionKind::Hold, ReconstructionKind::Filter] {
-            let mut session = session_beside(kind);
-            assert!(session.begin_picture(Vec::new()).is_err(), "{kind:?}");
+            assert!(!real_session(kind).can_begin_picture(), "{kind:?}");
         }
+        let mut session = real_session(ReconstructionKind::REPROJECT);
+        assert!(session.can_begin_picture());
+        let overlay = Overlay::Change;
+        session.apply(Command::Settings(Settings { overlay, ..session.settings }));
+        assert!(!session.can_begin_picture());
+        let simulated = white_session_with(ReconstructionKind::REPROJECT);
+        assert!(!simulated.can_begin_picture(), "the same bytes every time");
     }
 
     #[test]

@@ -171,8 +171,8 @@ impl Tracer for CpuTracer {
         self.threads
     }
 
-    fn spare_threads(&mut self, threads: usize) {
-        self.crew.spare(threads);
+    fn spare_threads(&mut self, threads: usize) -> bool {
+        self.crew.spare(threads)
     }
 
     fn pose(&mut self, scene_secs: f64, size: Size, pose: &mut Pose) -> bool {

@@ -36,6 +36,7 @@ pub(crate) trait Work: Send + Sync + 'static {
 
 /// Works until it is dropped; answers come in the order of the work.
 pub(crate) struct Crew<W: Work> {
+    threads: usize,
     board: Arc<Board<W>>,
     stack: Stack,
 }
@@ -106,7 +107,8 @@ impl<W: Work> Crew<W> {
         };
         let [work, relief, answer] = [(); 3].map(|()| Condvar::new());
         let board = Arc::new(Board { queue: Mutex::new(queue), work, relief, answer });
-        for index in 0..threads.max(1) {
+        let threads = threads.max(1);
+        for index in 0..threads {
             let board = Arc::clone(&board);
             let thread = std::thread::Builder::new().name(format!("{name}-{index}"));
             let started = thread.spawn(move || match index {
@@ -115,13 +117,18 @@ impl<W: Work> Crew<W> {
             });
             started.expect("threads for tracing can be started");
         }
-        Crew { board, stack: Stack::new() }
+        Crew { threads, board, stack: Stack::new() }
     }
 
-    /// So many of the threads rest from now on, once they are done with the pieces that they are at; never the caller's.
-    pub(crate) fn spare(&mut self, threads: usize) {
-        self.board.lock().spared = threads;
+    /// So many of the threads rest from now on, once they are done with the pieces that they are at; never the caller's. Where pieces take
+    /// long none rests: the caller would be late to call it back. Returns whether any is left, the caller's included.
+    pub(crate) fn spare(&mut self, threads: usize) -> bool {
+        let mut queue = self.board.lock();
+        queue.spared = if queue.is_short() { threads } else { 0 };
+        let is_left = queue.spared < self.threads;
+        drop(queue);
         self.board.work.notify_all();
+        is_left
     }
 
     /// Hands over work.

@@ -43,7 +43,8 @@ pub(crate) struct Order {
 
 /// A picture under way.
 pub(crate) struct Beside {
-    thread: JoinHandle<Work>,
+    /// Until it has been waited for.
+    thread: Option<JoinHandle<Work>>,
     late: Arc<Mutex<Late>>,
 }
 
@@ -51,7 +52,8 @@ pub(crate) struct Beside {
 pub(crate) type Late = VecDeque<(Time, Replaced)>;
 
 impl Beside {
-    /// `show` is given the picture, and what the pixels show.
+    /// `show` is given the picture, and what the pixels show; `end` is called when there is nothing left to do but to give everything back,
+    /// even if that has failed.
     ///
     /// # Panics
     /// If the system has no thread left.
@@ -60,10 +62,12 @@ impl Beside {
         order: Order,
         late: Late,
         show: impl FnOnce(&[[f32; 3]], &Canvas) + Send + 'static,
+        end: impl FnOnce() + Send + 'static,
     ) -> Beside {
         let late = Arc::new(Mutex::new(late));
         let inbox = Arc::clone(&late);
         let make = move || {
+            let _end = OnDrop(Some(end));
             work.refresh(&order);
             show(&work.picture, &work.canvas);
             // Not those that come meanwhile: it could go on for ever.
@@ -76,7 +80,7 @@ impl Beside {
         };
         let thread = Builder::new().name("picture".to_owned()).spawn(make);
         let thread = thread.expect("a thread for a picture can be started");
-        Beside { thread, late }
+        Beside { thread: Some(thread), late }
     }
 
     /// Samples have been written to the loop's canvas.
@@ -85,18 +89,39 @@ impl Beside {
     }
 
     pub(crate) fn is_done(&self) -> bool {
-        self.thread.is_finished()
+        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
     /// Waits for it. Also gives back what it has not come to.
     ///
     /// # Panics
     /// If the reconstruction has.
-    pub(crate) fn end(self) -> (Work, Late) {
-        let Beside { thread, late } = self;
+    pub(crate) fn end(mut self) -> (Work, Late) {
+        let thread = self.thread.take().expect("it is waited for once");
         let work = thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-        let late = std::mem::take(&mut *lock(&late));
+        let late = std::mem::take(&mut *lock(&self.late));
         (work, late)
+    }
+}
+
+impl Drop for Beside {
+    /// Nobody wants the picture any more; its thread ends before the loop does.
+    fn drop(&mut self) {
+        if let Some(thread) = self.thread.take() {
+            // A panic in there has been printed already.
+            thread.join().ok();
+        }
+    }
+}
+
+/// Calls a function when it goes, whatever the reason.
+struct OnDrop<F: FnOnce()>(Option<F>);
+
+impl<F: FnOnce()> Drop for OnDrop<F> {
+    fn drop(&mut self) {
+        if let Some(call) = self.0.take() {
+            call();
+        }
     }
 }
 

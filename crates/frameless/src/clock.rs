@@ -75,11 +75,6 @@ impl Clock {
         }
     }
 
-    /// Whether the renderer is given one batch at a time, see [`Clock::real_for_calls`].
-    pub(crate) fn awaits_each_call(&self) -> bool {
-        matches!(self, Clock::Real(Real { length: Some(_), .. }))
-    }
-
     /// Samples that the renderer traces in a batch's time.
     pub(crate) fn batch_length(&self) -> usize {
         match self {
@@ -201,11 +196,6 @@ impl Real {
             self.secs_per_sample += LEARNING_RATE * (measured - self.secs_per_sample);
         }
         self.last_answer = busy.then_some(now);
-    }
-
-    /// How many samples the renderer traces in so many seconds.
-    pub(crate) fn samples_in(&self, secs: f64) -> usize {
-        (secs / self.secs_per_sample) as usize
     }
 
     /// Samples in a batch that lasts as long as it should.

@@ -1,6 +1,7 @@
 //! THE LOOP: choose pixels → trace them now → keep the samples → observe what changed.
 
 use std::collections::VecDeque;
+use std::time::Duration;
 
 use thiserror::Error;
 
@@ -40,6 +41,8 @@ pub struct Engine<T> {
     refresh_threads: usize,
     // A picture under way has the reconstruction, and then the canvas with it.
     beside: Option<Beside>,
+    // It has all of the renderer's threads.
+    gives_way: bool,
     beside_canvas: Option<Canvas>,
     // What samples told that came meanwhile, of which the sampler has not heard yet.
     unheard: VecDeque<Told>,
@@ -106,6 +109,13 @@ const AHEAD: usize = 16;
 /// Batches under way at once on the real clock: while one is traced the next is chosen.
 const PIPELINE_DEPTH: usize = 2;
 
+/// While a picture has all threads there is a turn of the loop this often. Input is answered at once all the same; more often, and the
+/// picture takes longer.
+const PAUSE: Duration = Duration::from_millis(2);
+
+/// Such a turn takes this part of the time of others.
+const BRIEF: usize = 2;
+
 /// After a picture that was made beside the loop: of so many answers that came meanwhile the sampler hears, and so many are told to the
 /// reconstruction, per answer that comes, until none waits. More at once would hold up the loop, fewer would not be through before the next
 /// picture.
@@ -147,6 +157,7 @@ impl<T: Tracer> Engine<T> {
             picture: Vec::new(),
             refresh_threads: 1,
             beside: None,
+            gives_way: false,
             beside_canvas: None,
             unheard: VecDeque::new(),
             late: Late::new(),
@@ -192,47 +203,41 @@ impl<T: Tracer> Engine<T> {
         {
             return self.step_call(wanted);
         }
-        self.keep_busy(0.0);
+        if self.gives_way {
+            return self.step_briefly();
+        }
+        self.keep_busy();
         if self.outstanding == 0 {
             self.clock.rest();
             return Ok(0);
         }
         let kept = self.collect_one()?.unwrap_or(0);
-        // What was worked ahead has come while nobody waited for it.
-        let batch = self.clock.batch_length().max(self.tracer.samples_at_once());
-        let is_waited_for = self.outstanding <= PIPELINE_DEPTH * batch;
-        self.clock.answered(kept, self.outstanding > 0 && is_waited_for);
+        self.clock.answered(kept, self.outstanding > 0);
         Ok(kept)
     }
 
-    /// Real clock, renderers that work by themselves: enough to do for so many seconds in which [`Engine::step`] will not be called, as
-    /// while a picture is made.
-    pub fn work_ahead(&mut self, secs: f64) {
-        if self.clock.awaits_each_call() {
-            return;
-        }
-        // The time until the next answer will say nothing of how fast the renderer is.
-        self.clock.answered(0, false);
-        self.keep_busy(secs);
-    }
-
-    /// Real clock: chooses batches until the renderer has enough to do for so many seconds, and for the choosing of the next.
-    fn keep_busy(&mut self, secs: f64) {
-        while let Clock::Real(clock) = &mut self.clock {
-            let batch = clock.batch_length().max(self.tracer.samples_at_once());
-            if self.outstanding >= clock.samples_in(secs) + PIPELINE_DEPTH * batch {
-                return;
-            }
-            let (now, count) = clock.next_batch(batch);
+    /// Chooses batches until the renderer has enough to do.
+    fn keep_busy(&mut self) {
+        let batch = self.clock.batch_length().max(self.tracer.samples_at_once());
+        while self.outstanding < PIPELINE_DEPTH * batch {
             let before = self.outstanding;
-            if count > 0 {
-                self.choose_and_submit(now, count);
-            }
+            self.choose_and_submit_due(batch);
             // Nothing is due, or the sampler knows no pixel to look at.
             if self.outstanding == before {
                 return;
             }
         }
+    }
+
+    /// So little that it does not hold up the picture that has all of the threads. How long it takes says nothing of the renderer.
+    fn step_briefly(&mut self) -> Result<usize, EngineError> {
+        if self.outstanding == 0 {
+            let alone = self.clock.batch_length() / self.tracer.samples_at_once();
+            self.choose_and_submit_due((alone / BRIEF).max(1));
+        }
+        let kept = if self.outstanding > 0 { self.collect_one()?.unwrap_or(0) } else { 0 };
+        self.clock.answered(0, false);
+        Ok(kept)
     }
 
     /// One batch, awaited, for a renderer whose calls have a price.
@@ -248,6 +253,16 @@ impl<T: Tracer> Engine<T> {
         let kept = self.collect_all()?;
         self.clock.called(samples, now);
         Ok(kept)
+    }
+
+    /// Real clock.
+    fn choose_and_submit_due(&mut self, wanted: usize) {
+        if let Clock::Real(clock) = &mut self.clock {
+            let (now, count) = clock.next_batch(wanted);
+            if count > 0 {
+                self.choose_and_submit(now, count);
+            }
+        }
     }
 
     fn choose_and_submit(&mut self, now: Time, count: usize) {
@@ -468,24 +483,30 @@ impl<T: Tracer> Engine<T> {
         self.reconstruction.refresh(&refresh, &mut self.canvas, picture);
     }
 
-    /// Begins to make the picture at `now` in a thread of its own; the loop goes on. `show` is given the picture in that thread, when it is ready,
-    /// with the canvas as it is then told to be: its colours are not those of the samples. Until the [turn](Engine::step) after that the sampler does not hear
-    /// of what new samples told.
+    /// Whether [`Engine::refresh_beside`] is possible now: on the real clock, while no other picture is under way, and not where the
+    /// picture is made of the canvas itself (by [`Hold`] and [`Filter`](crate::Filter), or as the first of its size).
+    pub fn can_refresh_beside(&self) -> bool {
+        let is_real = matches!(self.clock, Clock::Real(_));
+        let has_samples = self.reconstruction.has_own_samples() && !self.is_first_picture;
+        is_real && has_samples && self.beside.is_none()
+    }
+
+    /// Begins to make the picture at `now` in a thread of its own; the loop goes on, with the threads that the picture does not need. If it
+    /// needs all, turns of the loop are brief, and come now and then (see [`Engine::pause`]).
     ///
-    /// Returns whether it has begun: not while another is under way, and not where the picture is made of the canvas itself (by
-    /// [`Hold`] and [`Filter`](crate::Filter), or as the first of its size).
+    /// `show` is given the picture in that thread, when it is ready, with the canvas as it is then told to be: its colours are not those of the
+    /// samples. `end` is called there once the loop can have everything back, which it has at its next [turn](Engine::step), or by
+    /// [`Engine::end_refresh`]. Until then the sampler does not hear of what new samples told.
     ///
     /// # Panics
-    /// If the system has no thread left.
+    /// If it is [not possible](Engine::can_refresh_beside), or the system has no thread left.
     pub fn refresh_beside(
         &mut self,
         now: Time,
         show: impl FnOnce(&[[f32; 3]], &Canvas) + Send + 'static,
-    ) -> bool {
-        let can = self.reconstruction.has_own_samples() && !self.is_first_picture;
-        if self.beside.is_some() || !can {
-            return false;
-        }
+        end: impl FnOnce() + Send + 'static,
+    ) {
+        assert!(self.can_refresh_beside(), "a picture cannot be made beside the loop now");
         let (secs, size) = (self.timeline.scene_secs(now), self.canvas.size());
         let order = Order {
             now,
@@ -498,7 +519,7 @@ impl<T: Tracer> Engine<T> {
             wants_motion: self.sampler.wants_motion(),
             threads: self.refresh_threads,
         };
-        self.tracer.spare_threads(order.threads);
+        self.gives_way = !self.tracer.spare_threads(order.threads);
         let mut canvas = self.beside_canvas.take().unwrap_or_else(|| Canvas::new(size));
         canvas.copy_times(&self.canvas);
         let work = Work {
@@ -510,13 +531,22 @@ impl<T: Tracer> Engine<T> {
             told: VecDeque::new(),
         };
         let late = std::mem::take(&mut self.late);
-        self.beside = Some(Beside::start(work, order, late, show));
-        true
+        self.beside = Some(Beside::start(work, order, late, show, end));
     }
 
     /// Whether a picture is being made beside the loop.
     pub fn is_refreshing(&self) -> bool {
         self.beside.is_some()
+    }
+
+    /// How long the next turn of the loop can wait if no input comes: not at all, but while a picture beside it has all threads.
+    pub fn pause(&self) -> Duration {
+        if self.gives_way { PAUSE } else { Duration::ZERO }
+    }
+
+    /// Waits for the picture that is being made beside the loop, if one is.
+    pub fn end_refresh(&mut self) {
+        self.take_back();
     }
 
     fn take_back_if_done(&mut self) {
@@ -525,12 +555,12 @@ impl<T: Tracer> Engine<T> {
         }
     }
 
-    /// Waits for the picture that is being made beside the loop, if one is.
     fn take_back(&mut self) {
         let Some(beside) = self.beside.take() else { return };
         let (work, late) = beside.end();
         let Work { reconstruction, mut canvas, picture, pose, lighting, told } = work;
         self.tracer.spare_threads(0);
+        self.gives_way = false;
         self.reconstruction = reconstruction;
         (self.picture, self.pose, self.lighting) = (picture, pose, lighting);
         self.canvas.take_all_but_colours(&mut canvas);

@@ -43,8 +43,11 @@ pub trait Tracer {
         1
     }
 
-    /// So many of the machine's cores are needed for something else, from now on; 0: none. The default goes on as before.
-    fn spare_threads(&mut self, _threads: usize) {}
+    /// So many of the machine's cores are needed for something else, from now on; 0: none. Returns whether it has any left: a renderer that
+    /// has none is asked for little, and seldom. The default goes on as before.
+    fn spare_threads(&mut self, _threads: usize) -> bool {
+        true
+    }
 
     /// Fill in where everything is in a picture of `size` at `scene_secs`, for a renderer that returns surfaces and can
     /// tell; its samples are then carried along as things move. Returns whether it can; the default cannot.
@@ -76,7 +79,7 @@ impl<T: Tracer + ?Sized> Tracer for Box<T> {
         (**self).samples_at_once()
     }
 
-    fn spare_threads(&mut self, threads: usize) {
+    fn spare_threads(&mut self, threads: usize) -> bool {
         (**self).spare_threads(threads)
     }
 

@@ -317,67 +317,6 @@ fn a_loop_driven_from_outside_makes_the_same_picture() {
     }
 }
 
-/// A renderer in a thread of its own that takes 10 µs per sample.
-struct Beside {
-    asked: std::sync::mpsc::Sender<Batch>,
-    answered: std::sync::mpsc::Receiver<Answer>,
-    longest: usize,
-}
-
-impl Beside {
-    fn start() -> Beside {
-        let (asked, asks) = std::sync::mpsc::channel::<Batch>();
-        let (answers, answered) = std::sync::mpsc::channel();
-        std::thread::spawn(move || {
-            for batch in asks {
-                std::thread::sleep(
-                    std::time::Duration::from_micros(10) * batch.requests.len() as u32,
-                );
-                let rgb = still(&batch);
-                if answers.send(Answer::to(batch, rgb, Vec::new())).is_err() {
-                    return;
-                }
-            }
-        });
-        Beside { asked, answered, longest: 0 }
-    }
-}
-
-impl Tracer for Beside {
-    fn submit(&mut self, batch: Batch) {
-        self.longest = self.longest.max(batch.requests.len());
-        self.asked.send(batch).expect("the thread lives");
-    }
-
-    fn collect(&mut self, _wait: bool) -> Option<Answer> {
-        self.answered.recv().ok()
-    }
-}
-
-#[test]
-fn a_renderer_works_on_while_a_picture_is_made() {
-    let sampler = SamplerKind::Permutation.build(1);
-    let mut engine = Engine::new(Size::new(64, 48), Clock::real(), sampler, Beside::start());
-    let run = |engine: &mut Engine<Beside>, secs: f64| {
-        let end = Time::from_secs(engine.now().secs() + secs);
-        while engine.now() < end {
-            engine.step().expect("finite colours");
-        }
-    };
-    run(&mut engine, 0.3);
-    let (kept, longest) = (engine.counters().kept, engine.tracer().longest);
-    engine.work_ahead(0.05);
-    std::thread::sleep(std::time::Duration::from_millis(60));
-    // All of it has been traced meanwhile, and is there at once.
-    run(&mut engine, 0.005);
-    let ahead = engine.counters().kept - kept;
-    assert!(ahead > 1500, "{ahead} samples, of some 4000 that 50 ms should bring");
-    // And is no reason to think that the renderer has become faster.
-    run(&mut engine, 0.1);
-    let after = engine.tracer().longest;
-    assert!(after < 2 * longest, "batches of {after} samples, before that {longest}");
-}
-
 #[test]
 fn answers_to_a_canvas_before_the_last_resize_are_dropped_whatever_its_size_was() {
     let (large, small) = (Size::new(30, 20), Size::new(8, 8));

@@ -1,6 +1,6 @@
 //! Input: how long it takes until the first pixel of the canvas shows it.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -29,8 +29,8 @@ const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Rows `latency.p50_ms` and `latency.p99_ms`: from a camera command, sent from another thread at any moment, until the first sample that
 /// was traced with the new camera has been kept, in a scene that stands still; with all that the window shows but without pictures. `latency.with_pictures.p50_ms` and
-/// `.p99_ms`: the same while pictures are made by the loop, at the rate of a display, as for the window; `latency.with_pictures_beside.…`: while they are made
-/// beside it. `….pictures_per_sec`: how many those were.
+/// `.p99_ms`: the same while pictures are made, at the rate of a display, as for window and page; `.pictures_per_sec`: how many those were.
+/// `….samples_per_sec`: how many samples were kept meanwhile.
 ///
 /// The percentiles are of all inputs; smallest and largest are those of single rounds.
 pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
@@ -54,54 +54,33 @@ pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
         PAUSE_MS[1],
     );
     let mut rows = Vec::new();
-    for pictures in Pictures::ALL {
-        let (name, what) = pictures.told();
+    for (pictures, name, what) in [
+        (false, "", "no picture is made"),
+        (true, ".with_pictures", "pictures are made at the rate of a display"),
+    ] {
         let rounds = rounds(pictures)?;
         let conditions = format!("{conditions}; {what}");
         for (percentile, part) in [("p50", 0.5), ("p99", 0.99)] {
             let name = format!("latency{name}.{percentile}_ms");
             rows.push(percentile_row(name, &rounds, part, &conditions));
         }
-        if pictures != Pictures::None {
-            let per_sec: Vec<f64> = rounds.iter().map(|round| round.pictures_per_sec).collect();
-            let name = format!("latency{name}.pictures_per_sec");
-            rows.push(Row::new(name, "pictures/s", &per_sec, &conditions));
+        let mut put = |what: &str, unit: &'static str, per_sec: fn(&Round) -> f64| {
+            let per_sec: Vec<f64> = rounds.iter().map(per_sec).collect();
+            rows.push(Row::new(format!("latency{name}.{what}"), unit, &per_sec, &conditions));
+        };
+        put("samples_per_sec", "samples/s", |round| round.samples_per_sec);
+        if pictures {
+            put("pictures_per_sec", "pictures/s", |round| round.pictures_per_sec);
         }
     }
     Ok(rows)
-}
-
-/// What else the loop has to do.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Pictures {
-    None,
-    /// As window and page have them made.
-    ByTheLoop,
-    BesideTheLoop,
-}
-
-impl Pictures {
-    const ALL: [Pictures; 3] = [Pictures::None, Pictures::ByTheLoop, Pictures::BesideTheLoop];
-
-    /// Part of the rows' names, and what it is.
-    fn told(self) -> (&'static str, &'static str) {
-        match self {
-            Pictures::None => ("", "no picture is made"),
-            Pictures::ByTheLoop => {
-                (".with_pictures", "pictures are made by the loop at the rate of a display")
-            }
-            Pictures::BesideTheLoop => (
-                ".with_pictures_beside",
-                "pictures are made beside the loop at the rate of a display",
-            ),
-        }
-    }
 }
 
 /// What came of one round.
 struct Round {
     latencies_ms: Vec<f64>,
     pictures_per_sec: f64,
+    samples_per_sec: f64,
 }
 
 fn percentile_row(name: String, rounds: &[Round], part: f64, conditions: &str) -> Row {
@@ -118,11 +97,12 @@ fn round(
     world: &Arc<World>,
     args: &BenchArgs,
     seed: u64,
-    pictures: Pictures,
+    pictures: bool,
 ) -> anyhow::Result<Round> {
     let mut user = User::start(world, args, seed, pictures)?;
     user.rest(WARM_UP_SECS)?;
     let (begin, before) = (user.clock.now(), user.pictures);
+    let samples = user.watch.samples.load(Ordering::Relaxed);
     let mut latencies_ms = Vec::new();
     let mut rng = Rng::new(seed);
     while user.clock.now().secs_since(begin) < args.secs || latencies_ms.is_empty() {
@@ -131,7 +111,12 @@ fn round(
         latencies_ms.push(1e3 * user.steer()?);
     }
     let secs = user.clock.now().secs_since(begin);
-    Ok(Round { latencies_ms, pictures_per_sec: f64::from(user.pictures - before) / secs })
+    let samples = user.watch.samples.load(Ordering::Relaxed) - samples;
+    Ok(Round {
+        latencies_ms,
+        pictures_per_sec: f64::from(user.pictures - before) / secs,
+        samples_per_sec: samples as f64 / secs,
+    })
 }
 
 /// Who has the loop in another thread, as a window has.
@@ -158,7 +143,7 @@ impl User {
         world: &Arc<World>,
         args: &BenchArgs,
         seed: u64,
-        pictures: Pictures,
+        pictures: bool,
     ) -> anyhow::Result<User> {
         let (news, received) = channel();
         let clock = Clock::real();
@@ -176,10 +161,6 @@ impl User {
         let settings = Settings::default();
         let session = Session::new(args.size, Clock::real(), settings, seed, watched)
             .with_refresh_threads(args.threads);
-        let session = match pictures {
-            Pictures::BesideTheLoop => session.with_pictures_beside(),
-            Pictures::None | Pictures::ByTheLoop => session,
-        };
         let wake = move || drop(news.send(News::Report));
         let render = RenderThread::start(session, wake)?;
         let looks = views(world).map(|view| (view, Arc::new(pose(world, &view, args.size))));
@@ -187,7 +168,7 @@ impl User {
         render.send(Command::Play(false));
         render.send(Command::Seek(0.0));
         render.send(Command::View(ViewChoice::Free(looks[0].0)));
-        if pictures != Pictures::None {
+        if pictures {
             render.send(Command::WantPicture { memory: Vec::new(), paint_secs: 0.0 });
         }
         Ok(User { clock, render, news: received, watch, looks, size: args.size, pictures: 0 })
@@ -260,6 +241,8 @@ fn views(world: &World) -> [View; 2] {
 #[derive(Default)]
 struct Watch {
     is_on: AtomicBool,
+    /// That have come so far.
+    samples: AtomicU64,
     turn: Mutex<Option<Turn>>,
 }
 
@@ -335,6 +318,7 @@ impl Tracer for Watched {
     fn collect(&mut self, wait: bool) -> Option<Answer> {
         self.tell();
         let answer = self.tracer.collect(wait)?;
+        self.watch.samples.fetch_add(answer.requests.len() as u64, Ordering::Relaxed);
         self.seen = self.watch.ends_with(&answer);
         Some(answer)
     }
@@ -347,8 +331,8 @@ impl Tracer for Watched {
         self.tracer.samples_at_once()
     }
 
-    fn spare_threads(&mut self, threads: usize) {
-        self.tracer.spare_threads(threads);
+    fn spare_threads(&mut self, threads: usize) -> bool {
+        self.tracer.spare_threads(threads)
     }
 
     fn pose(&mut self, scene_secs: f64, size: Size, pose: &mut Pose) -> bool {
@@ -374,5 +358,11 @@ impl Stage for Watched {
 
     fn set_world(&mut self, world: Arc<World>) {
         Stage::set_world(&mut self.tracer, world);
+    }
+
+    /// Asked for after every turn of the loop.
+    fn trouble(&mut self) -> Option<String> {
+        self.tell();
+        None
     }
 }

@@ -25,10 +25,11 @@ fn value(rows: &[(String, f64)], name: &str) -> f64 {
 #[test]
 fn latency_is_told_with_and_without_pictures() {
     let rows = rows(&["latency", "--rounds", "1", "--secs", "0.1", "--size", "64x48"]);
-    for pictures in ["", ".with_pictures", ".with_pictures_beside"] {
+    for pictures in ["", ".with_pictures"] {
         let [median, most] = ["p50", "p99"]
             .map(|percentile| value(&rows, &format!("latency{pictures}.{percentile}_ms")));
         assert!(0.0 < median && median <= most && most < 10_000.0, "{rows:?}");
+        assert!(value(&rows, &format!("latency{pictures}.samples_per_sec")) > 0.0, "{rows:?}");
         if !pictures.is_empty() {
             let name = format!("latency{pictures}.pictures_per_sec");
             assert!(value(&rows, &name) > 1.0, "{rows:?}");
