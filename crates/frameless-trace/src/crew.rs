@@ -445,7 +445,7 @@ mod tests {
     #[test]
     fn who_is_spared_does_nothing_until_called_again() {
         let mut crew = Crew::new(2, "test");
-        crew.spare(1);
+        assert!(crew.spare(1), "the caller is left");
         crew.submit(noted(5, true));
         let alone = crew.wait().unwrap();
         assert!(alone.iter().all(|&who| who == current().id()));
@@ -455,6 +455,15 @@ mod tests {
             crew.wait().unwrap().iter().any(|&who| who != current().id())
         });
         assert!(both, "never called again");
+    }
+
+    #[test]
+    fn nobody_is_left_if_all_are_spared_unless_what_they_do_takes_long() {
+        let mut crew = Crew::new(2, "test");
+        assert!(!crew.spare(2));
+        crew.submit(noted(5, false));
+        assert!(crew.spare(2));
+        crew.wait().unwrap();
     }
 
     #[test]

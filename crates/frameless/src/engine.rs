@@ -229,15 +229,15 @@ impl<T: Tracer> Engine<T> {
         }
     }
 
-    /// So little that it does not hold up the picture that has all of the threads. How long it takes says nothing of the renderer.
+    /// What is under way already, and so little more that it does not hold up the picture, which has all of the threads. How long it takes
+    /// says nothing of the renderer.
     fn step_briefly(&mut self) -> Result<usize, EngineError> {
-        if self.outstanding == 0 {
-            let alone = self.clock.batch_length() / self.tracer.samples_at_once();
-            self.choose_and_submit_due((alone / BRIEF).max(1));
-        }
-        let kept = if self.outstanding > 0 { self.collect_one()?.unwrap_or(0) } else { 0 };
+        let before = self.collect_all()?;
+        let alone = self.clock.batch_length() / self.tracer.samples_at_once();
+        self.choose_and_submit_due((alone / BRIEF).max(1));
+        let kept = self.collect_all()?;
         self.clock.answered(0, false);
-        Ok(kept)
+        Ok(before + kept)
     }
 
     /// One batch, awaited, for a renderer whose calls have a price.
