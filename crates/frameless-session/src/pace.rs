@@ -21,6 +21,9 @@ pub struct Pace {
     is_hurried: bool,
     // Somebody waits for the one that is being made.
     is_answer: bool,
+    // It is made with half of the threads.
+    with_half: bool,
+    is_cheap: bool,
     steered_until: Time,
 }
 
@@ -41,6 +44,9 @@ const STEERED_SECS: f64 = 0.5;
 const HURRIED_SHARE: f64 = 0.5;
 // Of the rest that the samples are owed, so much may be put off: two or three refreshes of a window.
 const CREDIT_SECS: f64 = 0.04;
+// A picture that all threads make in 10 ms, or half of them in 20, is made by half where nobody waits for it: it hardly comes later, and the
+// other threads trace meanwhile. Of a larger one samples would be chosen for too long without hearing of each other, and it would be late.
+const CHEAP_SECS: f64 = 0.02;
 // Whatever a picture costs, the next comes after this at the latest.
 const LONGEST_REST_SECS: f64 = 1.0;
 // Of the newest paint in the learned cost: one slow paint is no reason to slow down.
@@ -57,6 +63,8 @@ impl Pace {
     /// Told when a picture is ready, and how many seconds it took. The samples get their share before
     /// the next one: at once and not on average, since the first pictures of a large window cost most.
     pub fn made(&mut self, now: Time, refresh_secs: f64) {
+        let half_secs = if self.with_half { refresh_secs } else { 2.0 * refresh_secs };
+        self.is_cheap = half_secs < CHEAP_SECS;
         if std::mem::take(&mut self.is_answer) {
             self.steered_until = Time::from_secs(now.secs() + STEERED_SECS);
         }
@@ -82,6 +90,12 @@ impl Pace {
         }
     }
 
+    /// Whether the picture that is due now should be made with half of the threads, and not with all.
+    pub fn takes_half(&mut self, now: Time) -> bool {
+        self.with_half = self.is_cheap && !self.is_answer && !self.is_steered(now);
+        self.with_half
+    }
+
     fn is_steered(&self, now: Time) -> bool {
         now < self.steered_until
     }
@@ -98,6 +112,7 @@ impl Pace {
             return false;
         }
         self.is_answer = std::mem::take(&mut self.is_hurried);
+        self.with_half = false;
         // What was missed is not made up for.
         self.due = Time::from_secs(now.secs() + self.interval_secs());
         self.soonest = Time::from_secs(now.secs() + SHORTEST_SECS);
@@ -202,6 +217,26 @@ mod tests {
         let mut pace = Pace::default();
         pace.made(Time::ZERO, 60.0);
         assert!(pace.is_due(Time::from_secs(LONGEST_REST_SECS)));
+    }
+
+    #[test]
+    fn a_cheap_picture_that_nobody_waits_for_leaves_half_of_the_threads() {
+        let mut pace = Pace::default();
+        let mut now = ms(1000);
+        let mut made = |pace: &mut Pace, takes_ms: u64| {
+            now = (now.0..).step_by(1_000_000).map(Time).find(|&now| pace.is_due(now)).unwrap();
+            let with_half = pace.takes_half(now);
+            now.0 += takes_ms * 1_000_000;
+            pace.made(now, 1e-3 * takes_ms as f64);
+            with_half
+        };
+        assert!(!made(&mut pace, 9), "nobody knows how long it will take");
+        assert!(made(&mut pace, 19) && made(&mut pace, 25));
+        assert!(!made(&mut pace, 12), "too long for half of them");
+        assert!(!made(&mut pace, 9));
+        pace.hurry();
+        assert!(!made(&mut pace, 9), "somebody waits");
+        assert!(!made(&mut pace, 9), "and will again");
     }
 
     #[test]

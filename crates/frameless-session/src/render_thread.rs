@@ -171,6 +171,7 @@ fn run<S: Stage>(
                 let (show, end) = (Arc::clone(report), to_itself.clone());
                 session.begin_picture(
                     memory,
+                    pace.takes_half(begin),
                     move |picture| show(Report::Picture(picture)),
                     // The loop may have ended.
                     move || drop(end.send(Heard::PictureEnds(begin))),

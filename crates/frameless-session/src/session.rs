@@ -5,8 +5,8 @@
 use std::time::Duration;
 
 use frameless::{
-    AdaptiveOptions, Canvas, Clock, Display, Engine, EngineError, ReconstructionKind, Sampler, SamplerKind,
-    Size, Time, Tracer,
+    AdaptiveOptions, Canvas, Clock, Display, Engine, EngineError, ReconstructionKind, Sampler,
+    SamplerKind, Size, Time, Tracer,
 };
 use frameless_scene::View;
 
@@ -54,6 +54,7 @@ pub struct Session<S> {
     heat_maps: HeatMaps,
     throughput: Throughput,
     mark: u64,
+    refresh_threads: usize,
 }
 
 impl<S: Stage> Session<S> {
@@ -76,6 +77,7 @@ impl<S: Stage> Session<S> {
             heat_maps,
             throughput,
             mark: 0,
+            refresh_threads: 1,
         }
     }
 
@@ -91,7 +93,7 @@ impl<S: Stage> Session<S> {
     pub fn with_refresh_threads(mut self, threads: usize) -> Self {
         let cores = || std::thread::available_parallelism().map_or(1, usize::from);
         let threads = if threads == 0 { cores() } else { threads };
-        self.engine.set_refresh_threads(threads.min(MOST_REFRESH_THREADS));
+        self.refresh_threads = threads.min(MOST_REFRESH_THREADS);
         self
     }
 
@@ -223,7 +225,8 @@ impl<S: Stage> Session<S> {
         self.settings.overlay == Overlay::None && self.engine.can_refresh_beside()
     }
 
-    /// Begins to make the picture of now beside the loop, in reused memory. `show` is given it when it is ready, and `end` is called when
+    /// Begins to make the picture of now beside the loop, in reused memory, with all [threads](Session::with_refresh_threads) or with half of
+    /// them, so that the loop has the others. `show` is given it when it is ready, and `end` is called when
     /// [`Session::end_picture`] will not have to wait any longer, both in a thread of the picture's.
     ///
     /// # Panics
@@ -231,6 +234,7 @@ impl<S: Stage> Session<S> {
     pub fn begin_picture(
         &mut self,
         memory: Vec<[u8; 4]>,
+        with_half: bool,
         show: impl FnOnce(Picture) + Send + 'static,
         end: impl FnOnce() + Send + 'static,
     ) {
@@ -243,6 +247,9 @@ impl<S: Stage> Session<S> {
             let status = Status { ages: shown::ages(canvas, now), ..status };
             show(Picture { size, rgba, mark, status });
         };
+        let threads =
+            if with_half { self.refresh_threads.div_ceil(2) } else { self.refresh_threads };
+        self.engine.set_refresh_threads(threads);
         self.engine.refresh_beside(now, show, end);
     }
 
@@ -268,6 +275,7 @@ impl<S: Stage> Session<S> {
                 rgba.extend_from_slice(self.held.rgba());
             }
             ReconstructionKind::Filter | ReconstructionKind::Reproject(_) => {
+                self.engine.set_refresh_threads(self.refresh_threads);
                 rgba.extend(self.engine.refresh(now).iter().map(|&colour| rgba8(colour)));
             }
         }
@@ -417,6 +425,7 @@ mod tests {
         let ended = shown.clone();
         session.begin_picture(
             vec![[7; 4]; 3],
+            false,
             move |picture| shown.send(Some(picture)).unwrap(),
             move || ended.send(None).unwrap(),
         );

@@ -6,8 +6,8 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
 use frameless::{
-    Answer, Batch, Canvas, Clock, Engine, Function, Observation, ReconstructionKind, Request, Sampler,
-    Size, Time, Tracer,
+    Answer, Batch, Canvas, Clock, Engine, Function, Observation, ReconstructionKind, Request,
+    Sampler, Size, Time, Tracer,
 };
 
 const SIZE: Size = Size { width: 40, height: 30 };

@@ -93,12 +93,7 @@ fn percentile_row(name: String, rounds: &[Round], part: f64, conditions: &str) -
     Row { value: of(all), ..Row::new(name, "ms", &each, conditions) }
 }
 
-fn round(
-    world: &Arc<World>,
-    args: &BenchArgs,
-    seed: u64,
-    pictures: bool,
-) -> anyhow::Result<Round> {
+fn round(world: &Arc<World>, args: &BenchArgs, seed: u64, pictures: bool) -> anyhow::Result<Round> {
     let mut user = User::start(world, args, seed, pictures)?;
     user.rest(WARM_UP_SECS)?;
     let (begin, before) = (user.clock.now(), user.pictures);
