@@ -107,7 +107,7 @@ impl Waiting {
             by_class[*next] = pixel;
             *next += 1;
         }
-        std::mem::swap(ordered, by_class);
+        ordered.copy_from_slice(by_class);
         self.by_rank(Hole::OffCentre, grid.size.width, ordered);
         self.clear();
     }
