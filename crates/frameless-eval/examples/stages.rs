@@ -192,9 +192,14 @@ impl Reconstruction for Stages {
         self.whole.aim(now, canvas, requests);
     }
 
-    fn refresh(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas, picture: &mut Picture) {
-        self.own.refresh(refresh, canvas, &mut self.carried.lock().expect("nobody panicked"));
-        self.whole.refresh(refresh, canvas, picture);
+    fn refresh(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas) {
+        self.own.refresh(refresh, canvas);
+        self.carried.lock().expect("nobody panicked").clone_from(&self.own.picture().to_vec());
+        self.whole.refresh(refresh, canvas);
+    }
+
+    fn picture(&self) -> &[[f32; 3]] {
+        self.whole.picture()
     }
 }
 

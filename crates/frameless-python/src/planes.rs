@@ -22,7 +22,7 @@ pub(crate) fn image<'py>(
     checked(shared.with(py, |state| state.engine.canvas().size())?)?;
     let (size, picture) = shared.with_long(py, move |state| {
         let now = now.unwrap_or_else(|| state.engine.now());
-        (state.engine.canvas().size(), state.picture(now, Vec::new()))
+        (state.engine.canvas().size(), state.picture(now))
     })?;
     let Some(out) = checked(size)? else { return array::colours(py, size, picture) };
     let mut target = out.try_readwrite()?;

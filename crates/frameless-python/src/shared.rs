@@ -45,7 +45,6 @@ pub(crate) struct State {
 struct Refreshes {
     last: Time,
     cost_secs: f64,
-    unseen: Vec<[f32; 3]>,
 }
 
 /// As a display does.
@@ -68,12 +67,16 @@ impl State {
     }
 
     /// The picture at `now`.
-    pub(crate) fn picture(&mut self, now: Time, mut memory: Vec<[f32; 3]>) -> Vec<[f32; 3]> {
+    pub(crate) fn picture(&mut self, now: Time) -> Vec<[f32; 3]> {
+        self.refresh(now);
+        self.engine.picture().to_vec()
+    }
+
+    fn refresh(&mut self, now: Time) {
         let begin = self.engine.now();
-        self.engine.refresh_into(now, &mut memory);
+        self.engine.refresh(now);
         self.refreshes.last = now;
         self.refreshes.cost_secs = self.engine.now().secs_since(begin);
-        memory
     }
 
     /// Makes a picture that nobody sees, if none has been made for long.
@@ -82,8 +85,7 @@ impl State {
         let interval_secs = REFRESH_SECS.max(COSTS_PER_REFRESH * self.refreshes.cost_secs);
         // The clock's times are rounded down.
         if now.secs_since(self.refreshes.last) + 1e-9 >= interval_secs {
-            let memory = std::mem::take(&mut self.refreshes.unseen);
-            self.refreshes.unseen = self.picture(now, memory);
+            self.refresh(now);
         }
     }
 

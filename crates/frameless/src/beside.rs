@@ -15,7 +15,6 @@ use crate::{Canvas, Display, Findings, Lighting, Pose, Rates, Reconstruction, Re
 pub(crate) struct Work {
     pub(crate) reconstruction: Box<dyn Reconstruction>,
     pub(crate) canvas: Canvas,
-    pub(crate) picture: Vec<[f32; 3]>,
     pub(crate) pose: Pose,
     pub(crate) lighting: Lighting,
     /// The samples of answers that have come meanwhile, and what they told.
@@ -69,7 +68,7 @@ impl Beside {
         let make = move || {
             let _end = OnDrop(Some(end));
             work.refresh(&order);
-            show(&work.picture, &work.canvas);
+            show(work.reconstruction.picture(), &work.canvas);
             // Not those that come meanwhile: it could go on for ever.
             let waiting = lock(&inbox).len();
             for _ in 0..waiting {
@@ -137,7 +136,7 @@ impl Work {
             wants_motion: order.wants_motion,
             threads: order.threads,
         };
-        self.reconstruction.refresh(&refresh, &mut self.canvas, &mut self.picture);
+        self.reconstruction.refresh(&refresh, &mut self.canvas);
     }
 
     fn keep(&mut self, now: Time, replaced: Replaced, order: &Order) {

@@ -46,7 +46,7 @@ impl Canvas {
             last_minute: Vec::new(),
             updates: 0,
             shown_at: Time::ZERO,
-            samples: vec![0; size.pixels()],
+            samples: Vec::new(),
             samples_wanted: 0,
             tile_contrast: Vec::new(),
             tile_motion: Vec::new(),
@@ -124,7 +124,7 @@ impl Canvas {
         !mark.is_known() || Mark::at(self.shown_at).since(mark) >= 0
     }
 
-    /// Of how many samples each pixel shows the mean, row-major; 0 where the picture does not rest.
+    /// Of how many samples each pixel shows the mean, row-major; 0 where the picture does not rest. Empty if nobody adds samples up.
     pub fn samples(&self) -> &[u16] {
         &self.samples
     }
@@ -157,27 +157,27 @@ impl Canvas {
         self.updates
     }
 
-    /// The marks of all tiles, to be changed where they are and then given to [`Canvas::update`]. The canvas is without them until then.
-    pub(crate) fn lend(&mut self) -> Vec<TileMarks> {
-        self.traced.lend()
+    /// The marks of all tiles and [`Canvas::holes`], to be changed where they are and then given to [`Canvas::update`]. The canvas is
+    /// without them until then.
+    pub(crate) fn lend(&mut self) -> (Vec<TileMarks>, Vec<u32>) {
+        (self.traced.lend(), std::mem::take(&mut self.holes))
     }
 
-    /// What every pixel shows has been found out anew: when it was traced, whether it is known, and who waits to be traced. The
-    /// old vectors are handed back, to be used again.
+    /// What every pixel shows has been found out anew: when it was traced, whether it is known, and who waits to be traced.
     ///
     /// # Panics
     /// If there is not one mark per pixel.
-    pub(crate) fn update(&mut self, now: Time, holes: &mut Vec<u32>, marks: &mut Vec<TileMarks>) {
+    pub(crate) fn update(&mut self, now: Time, marks: Vec<TileMarks>, holes: Vec<u32>) {
         self.shown_at = now;
-        std::mem::swap(&mut self.holes, holes);
-        self.traced.swap(now, marks);
+        self.holes = holes;
+        self.traced.replace(now, marks);
         self.updates += 1;
     }
 
-    /// Of how many samples each pixel shows the mean from now on, and how many are wanted.
+    /// Of how many samples each pixel shows the mean from now on, and how many are wanted. `count` may be empty: none rests.
     pub(crate) fn set_samples(&mut self, wanted: u16, count: &[u16]) {
         self.samples_wanted = wanted;
-        self.samples.clone_from_slice(count);
+        count.clone_into(&mut self.samples);
     }
 
     /// Pixels to be traced shortly before the next refresh. The old vector is handed back, to be used again.
@@ -203,6 +203,12 @@ impl Canvas {
         wide::prefetch(&self.rgb, i);
         wide::prefetch(&self.samples, i);
         self.traced.prefetch(self.traced.place(pixel));
+    }
+
+    /// Whether a pixel rests, so that further samples can be added to its own.
+    #[inline(always)]
+    pub(crate) fn rests(&self, pixel: u32) -> bool {
+        self.samples.get(pixel as usize).is_some_and(|&samples| samples > 0)
     }
 
     /// A sample has been added to those of a pixel at rest; returns the time and colour of the one at its centre, which stays.
@@ -268,7 +274,7 @@ impl Canvas {
             last_minute: Vec::new(),
             updates: self.updates + 1,
             shown_at: self.shown_at,
-            samples: vec![0; size.pixels()],
+            samples: Vec::new(),
             samples_wanted: 0,
             tile_contrast: Vec::new(),
             tile_motion: Vec::new(),

@@ -37,7 +37,6 @@ pub struct Engine<T> {
     observations: Vec<Observation>,
     pose: Pose,
     lighting: Lighting,
-    picture: Vec<[f32; 3]>,
     refresh_threads: usize,
     // A picture under way has the reconstruction, and then the canvas with it.
     beside: Option<Beside>,
@@ -154,7 +153,6 @@ impl<T: Tracer> Engine<T> {
             observations: Vec::new(),
             pose: Pose::default(),
             lighting: Lighting::default(),
-            picture: Vec::new(),
             refresh_threads: 1,
             beside: None,
             gives_way: false,
@@ -375,8 +373,7 @@ impl<T: Tracer> Engine<T> {
                 continue;
             }
             let known = self.canvas.is_known(pixel);
-            let is_refinement =
-                request.sample_index > 0 && self.canvas.samples()[pixel as usize] > 0;
+            let is_refinement = request.sample_index > 0 && self.canvas.rests(pixel);
             let (previous, old) = match is_refinement {
                 true => self.canvas.refine(pixel),
                 false => self.canvas.replace(pixel, answer.now, rgb),
@@ -450,14 +447,6 @@ impl<T: Tracer> Engine<T> {
 
     /// The picture at `now`, display-referred sRGB in [0, 1], row-major.
     pub fn refresh(&mut self, now: Time) -> &[[f32; 3]] {
-        let mut picture = std::mem::take(&mut self.picture);
-        self.refresh_into(now, &mut picture);
-        self.picture = picture;
-        &self.picture
-    }
-
-    /// As [`Engine::refresh`], for who keeps the picture: whatever `picture` held before is overwritten.
-    pub fn refresh_into(&mut self, now: Time, picture: &mut Vec<[f32; 3]>) {
         self.take_back();
         self.is_first_picture = false;
         // The time until the next answer will say nothing of how fast the renderer is.
@@ -480,7 +469,13 @@ impl<T: Tracer> Engine<T> {
             wants_motion,
             threads: self.refresh_threads,
         };
-        self.reconstruction.refresh(&refresh, &mut self.canvas, picture);
+        self.reconstruction.refresh(&refresh, &mut self.canvas);
+        self.reconstruction.picture()
+    }
+
+    /// The picture of the last refresh; empty before the first, and while one is made beside the loop.
+    pub fn picture(&self) -> &[[f32; 3]] {
+        self.reconstruction.picture()
     }
 
     /// Whether [`Engine::refresh_beside`] is possible now: on the real clock, while no other picture is under way, and not where the
@@ -525,7 +520,6 @@ impl<T: Tracer> Engine<T> {
         let work = Work {
             reconstruction: std::mem::replace(&mut self.reconstruction, Box::new(Hold::default())),
             canvas,
-            picture: std::mem::take(&mut self.picture),
             pose: std::mem::take(&mut self.pose),
             lighting: std::mem::take(&mut self.lighting),
             told: VecDeque::new(),
@@ -558,11 +552,11 @@ impl<T: Tracer> Engine<T> {
     fn take_back(&mut self) {
         let Some(beside) = self.beside.take() else { return };
         let (work, late) = beside.end();
-        let Work { reconstruction, mut canvas, picture, pose, lighting, told } = work;
+        let Work { reconstruction, mut canvas, pose, lighting, told } = work;
         self.tracer.spare_threads(0);
         self.gives_way = false;
         self.reconstruction = reconstruction;
-        (self.picture, self.pose, self.lighting) = (picture, pose, lighting);
+        (self.pose, self.lighting) = (pose, lighting);
         self.canvas.take_all_but_colours(&mut canvas);
         self.beside_canvas = Some(canvas);
         self.unheard.extend(told);

@@ -45,6 +45,7 @@ mod rng;
 mod sample;
 mod sampler;
 mod samplers;
+mod spare;
 mod tile;
 mod tile_pdf;
 mod time;

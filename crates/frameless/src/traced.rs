@@ -161,18 +161,18 @@ impl Traced {
         })
     }
 
-    /// The marks of all tiles, until they are given back by [`Traced::swap`].
+    /// The marks of all tiles, until they are given back by [`Traced::replace`].
     pub(crate) fn lend(&mut self) -> Vec<TileMarks> {
         std::mem::take(&mut self.tiles)
     }
 
-    /// The marks of all tiles are others from now on, at `now`. The old ones are handed back, to be used again.
+    /// The marks of all tiles are others from now on, at `now`.
     ///
     /// # Panics
     /// If there are not as many.
-    pub(crate) fn swap(&mut self, now: Time, marks: &mut Vec<TileMarks>) {
+    pub(crate) fn replace(&mut self, now: Time, marks: Vec<TileMarks>) {
         assert_eq!(marks.len(), self.grid.len());
-        std::mem::swap(&mut self.tiles, marks);
+        self.tiles = marks;
         self.latest = self.latest.max(now);
     }
 

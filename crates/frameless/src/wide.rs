@@ -49,9 +49,8 @@ pub(crate) trait Unit: Copy {
     fn splat_f(x: f32) -> Self::F;
     fn load_f(lanes: &[f32; 8]) -> Self::F;
     fn store_f(a: Self::F, lanes: &mut [f32; 8]);
-    fn columns(rows: [&[f32; 8]; 8]) -> [Self::F; 8];
-    fn first_columns(rows: [&[f32; 8]; 8]) -> [Self::F; 4];
-    fn with_first(columns: [Self::F; 3], rows: [&[f32; 8]; 8]) -> [[f32; 8]; 8];
+    fn four_columns(rows: [&[f32; 4]; 8]) -> [Self::F; 4];
+    fn six_columns(rows: [&[f32; 6]; 8]) -> [Self::F; 6];
     fn triples(columns: [Self::F; 3]) -> [[f32; 3]; 8];
     fn to_bits(a: Self::F) -> Self::M;
     fn from_bits(a: Self::M) -> Self::F;
@@ -76,6 +75,7 @@ pub(crate) trait Unit: Copy {
     fn minus(a: Self::M, b: Self::M) -> Self::M;
     fn times(a: Self::M, b: Self::M) -> Self::M;
     fn packed(a: Self::M, lanes: u32) -> [u32; 8];
+    fn shifted_left<const BITS: i32>(a: Self::M) -> Self::M;
     fn shifted_right<const BITS: i32>(a: Self::M) -> Self::M;
     fn to_f32(a: Self::M) -> Self::F;
     fn bits(a: Self::M) -> u32;
@@ -183,22 +183,16 @@ impl<U: Unit> F8<U> {
 
     /// The columns of eight rows.
     #[inline(always)]
-    pub(crate) fn columns(rows: [&[f32; 8]; 8]) -> [Self; 8] {
-        let [a, b, c, d, e, f, g, h] = U::columns(rows);
-        [F8(a), F8(b), F8(c), F8(d), F8(e), F8(f), F8(g), F8(h)]
-    }
-
-    /// The first four of them.
-    #[inline(always)]
-    pub(crate) fn first_columns(rows: [&[f32; 8]; 8]) -> [Self; 4] {
-        let [a, b, c, d] = U::first_columns(rows);
+    pub(crate) fn four_columns(rows: [&[f32; 4]; 8]) -> [Self; 4] {
+        let [a, b, c, d] = U::four_columns(rows);
         [F8(a), F8(b), F8(c), F8(d)]
     }
 
-    /// `rows`, but for these columns instead of their first three.
+    /// The same of six.
     #[inline(always)]
-    pub(crate) fn with_first([a, b, c]: [Self; 3], rows: [&[f32; 8]; 8]) -> [[f32; 8]; 8] {
-        U::with_first([a.0, b.0, c.0], rows)
+    pub(crate) fn six_columns(rows: [&[f32; 6]; 8]) -> [Self; 6] {
+        let [a, b, c, d, e, f] = U::six_columns(rows);
+        [F8(a), F8(b), F8(c), F8(d), F8(e), F8(f)]
     }
 
     /// Lane by lane one of each.
@@ -302,6 +296,11 @@ impl<U: Unit> M8<U> {
     #[inline(always)]
     pub(crate) fn packed(self, lanes: u32) -> [u32; 8] {
         U::packed(self.0, lanes)
+    }
+
+    #[inline(always)]
+    pub(crate) fn shifted_left<const BITS: i32>(self) -> Self {
+        M8(U::shifted_left::<BITS>(self.0))
     }
 
     /// As signed numbers.
@@ -511,11 +510,11 @@ mod tests {
             });
             let rows = rows.each_ref();
             let bits = |x: F8<U>| x.lanes().map(f32::to_bits);
-            self.results.extend(numbers.into_iter().chain(F8::columns(rows)).map(bits));
-            self.results.extend(F8::first_columns(rows).map(bits));
+            let six = rows.map(|row| row.first_chunk().expect("eight"));
+            self.results.extend(numbers.into_iter().chain(F8::six_columns(six)).map(bits));
+            self.results.extend(F8::four_columns(rows.map(|row| &row.as_chunks().0[0])).map(bits));
             let triples = F8::triples([a, b, a - b]);
             self.results.extend((0..3).map(|k| triples.map(|triple| triple[k].to_bits())));
-            self.results.extend(F8::with_first([a, b, a - b], rows).map(|r| r.map(f32::to_bits)));
             let wholes = [
                 mask,
                 a.truncated(),
@@ -530,6 +529,7 @@ mod tests {
                 m.or(mask, n),
                 m.not(),
                 M8::first_lanes(3),
+                m.shifted_left::<10>(),
                 m.shifted_right::<10>(),
             ];
             self.results.extend(wholes.map(M8::lanes));
@@ -559,7 +559,7 @@ mod tests {
             assert_eq!(f32::from_bits(here[0][3]), numbers[0][3] + numbers[1][3]);
             let packed = here[here.len() - 257 + 0b1001_0010];
             assert_eq!(packed[..4], [wholes[0][1], wholes[0][4], wholes[0][7], 0]);
-            assert_eq!(here[31 + 5], std::array::from_fn(|k| wholes[0][k] & wholes[1][k]));
+            assert_eq!(here[21 + 5], std::array::from_fn(|k| wholes[0][k] & wholes[1][k]));
         }
     }
 }

@@ -17,6 +17,7 @@ use crate::{Canvas, Display, Kept, Rates, Reconstruction, Refresh};
 pub struct Filter {
     squares: Vec<f32>,
     held: Vec<[f32; 3]>,
+    picture: Vec<[f32; 3]>,
     contrast: Vec<f32>,
     age_secs: Vec<f32>,
 }
@@ -29,17 +30,23 @@ impl Reconstruction for Filter {
         findings.changes.extend(display.changes(kept.new, kept.old, &mut self.squares));
     }
 
-    fn refresh(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas, picture: &mut Vec<[f32; 3]>) {
+    fn refresh(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas) {
         self.held.clear();
         self.held.extend(canvas.rgb().iter().map(|&rgb| refresh.display.encode(rgb)));
-        picture.clone_from(&self.held);
+        self.picture.clone_from(&self.held);
         let Some(rates) = refresh.rates else { return };
         tile_contrast(&self.held, &rates.grid, &mut self.contrast);
         self.age_secs.clear();
         self.age_secs.extend(canvas.time().map(|time| refresh.now.secs_since(time) as f32));
+        let mut picture = std::mem::take(&mut self.picture);
         for tile in 0..rates.grid.len() {
-            self.filter_tile(rates, tile, picture);
+            self.filter_tile(rates, tile, &mut picture);
         }
+        self.picture = picture;
+    }
+
+    fn picture(&self) -> &[[f32; 3]] {
+        &self.picture
     }
 }
 

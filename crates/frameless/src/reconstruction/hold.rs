@@ -7,6 +7,7 @@ use crate::{Canvas, Display, Kept, Reconstruction, Refresh};
 #[derive(Default)]
 pub struct Hold {
     squares: Vec<f32>,
+    picture: Vec<[f32; 3]>,
 }
 
 impl Reconstruction for Hold {
@@ -14,9 +15,13 @@ impl Reconstruction for Hold {
         findings.changes.extend(display.changes(kept.new, kept.old, &mut self.squares));
     }
 
-    fn refresh(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas, picture: &mut Vec<[f32; 3]>) {
-        picture.clear();
-        picture.extend(canvas.rgb().iter().map(|&rgb| refresh.display.encode(rgb)));
+    fn refresh(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas) {
+        self.picture.clear();
+        self.picture.extend(canvas.rgb().iter().map(|&rgb| refresh.display.encode(rgb)));
+    }
+
+    fn picture(&self) -> &[[f32; 3]] {
+        &self.picture
     }
 }
 

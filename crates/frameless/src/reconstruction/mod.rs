@@ -80,8 +80,11 @@ pub trait Reconstruction: Send {
         false
     }
 
-    /// The picture, display-referred sRGB in [0, 1], row-major. Also tells the canvas what the pixels show by then.
-    fn refresh(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas, picture: &mut Vec<[f32; 3]>);
+    /// Makes [`Reconstruction::picture`] anew, and tells the canvas what the pixels show by then.
+    fn refresh(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas);
+
+    /// The picture of the last refresh, display-referred sRGB in [0, 1], row-major; empty before the first.
+    fn picture(&self) -> &[[f32; 3]];
 }
 
 /// The reconstructions that come with the crate.

@@ -29,42 +29,17 @@ impl Unit for Avx2 {
     }
 
     #[inline(always)]
-    fn columns(rows: [&[f32; 8]; 8]) -> [__m256; 8] {
-        unsafe {
-            let [a, b, c, d] = four_columns::<0>(rows);
-            let [e, f, g, h] = four_columns::<4>(rows);
-            [a, b, c, d, e, f, g, h]
-        }
+    fn four_columns(rows: [&[f32; 4]; 8]) -> [__m256; 4] {
+        unsafe { columns(rows, 0) }
     }
 
     #[inline(always)]
-    fn first_columns(rows: [&[f32; 8]; 8]) -> [__m256; 4] {
-        unsafe { four_columns::<0>(rows) }
-    }
-
-    #[inline(always)]
-    fn with_first([a, b, c]: [__m256; 3], rows: [&[f32; 8]; 8]) -> [[f32; 8]; 8] {
-        let mut changed = [[0.0; 8]; 8];
+    fn six_columns(rows: [&[f32; 6]; 8]) -> [__m256; 6] {
         unsafe {
-            // Rows 0 to 3 in the lower halves, 4 to 7 in the upper ones.
-            let (ab_low, c_low) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, c));
-            let (ab_high, c_high) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, c));
-            let firsts = [
-                _mm256_shuffle_ps::<0b01_00_01_00>(ab_low, c_low),
-                _mm256_shuffle_ps::<0b11_10_11_10>(ab_low, c_low),
-                _mm256_shuffle_ps::<0b01_00_01_00>(ab_high, c_high),
-                _mm256_shuffle_ps::<0b11_10_11_10>(ab_high, c_high),
-            ];
-            for (k, lower) in firsts.into_iter().enumerate() {
-                let upper = _mm256_permute2f128_ps::<0x11>(lower, lower);
-                for (row, first) in [(k, lower), (k + 4, upper)] {
-                    let rest = _mm256_loadu_ps(rows[row].as_ptr());
-                    let whole = _mm256_blend_ps::<0b0000_0111>(rest, first);
-                    _mm256_storeu_ps(changed[row].as_mut_ptr(), whole);
-                }
-            }
+            let [a, b, _, _] = columns(rows, 0);
+            let [c, d, e, f] = columns(rows, 2);
+            [a, b, c, d, e, f]
         }
-        changed
     }
 
     #[inline(always)]
@@ -211,6 +186,11 @@ impl Unit for Avx2 {
     }
 
     #[inline(always)]
+    fn shifted_left<const BITS: i32>(a: __m256i) -> __m256i {
+        unsafe { _mm256_slli_epi32::<BITS>(a) }
+    }
+
+    #[inline(always)]
     fn shifted_right<const BITS: i32>(a: __m256i) -> __m256i {
         unsafe { _mm256_srai_epi32::<BITS>(a) }
     }
@@ -244,17 +224,17 @@ static PACKED: [[u32; 8]; 256] = {
     packed
 };
 
-/// Columns `FIRST` to `FIRST + 3`, half by half, since 256-bit shuffles do not cross the middle.
+/// Columns `first` to `first` + 3, half by half, since 256-bit shuffles do not cross the middle.
 ///
 /// # Safety
-/// The processor has AVX2, and `FIRST` is 0 or 4.
+/// The processor has AVX2, and there are as many columns.
 #[inline(always)]
-unsafe fn four_columns<const FIRST: usize>(rows: [&[f32; 8]; 8]) -> [__m256; 4] {
+unsafe fn columns<const N: usize>(rows: [&[f32; N]; 8], first: usize) -> [__m256; 4] {
     unsafe {
         let [a, b, c, d, e, f, g, h] = rows;
-        let pair = |low: &[f32; 8], high: &[f32; 8]| {
-            let low = _mm256_castps128_ps256(_mm_loadu_ps(low.as_ptr().add(FIRST)));
-            _mm256_insertf128_ps::<1>(low, _mm_loadu_ps(high.as_ptr().add(FIRST)))
+        let pair = |low: &[f32; N], high: &[f32; N]| {
+            let low = _mm256_castps128_ps256(_mm_loadu_ps(low.as_ptr().add(first)));
+            _mm256_insertf128_ps::<1>(low, _mm_loadu_ps(high.as_ptr().add(first)))
         };
         let (ae, bf, cg, dh) = (pair(a, e), pair(b, f), pair(c, g), pair(d, h));
         let (ab_low, cd_low) = (_mm256_unpacklo_ps(ae, bf), _mm256_unpacklo_ps(cg, dh));

@@ -35,22 +35,13 @@ impl Unit for Portable {
     }
 
     #[inline(always)]
-    fn columns(rows: [&[f32; 8]; 8]) -> [[f32; 8]; 8] {
+    fn four_columns(rows: [&[f32; 4]; 8]) -> [[f32; 8]; 4] {
         std::array::from_fn(|k| rows.map(|row| row[k]))
     }
 
     #[inline(always)]
-    fn first_columns(rows: [&[f32; 8]; 8]) -> [[f32; 8]; 4] {
+    fn six_columns(rows: [&[f32; 6]; 8]) -> [[f32; 8]; 6] {
         std::array::from_fn(|k| rows.map(|row| row[k]))
-    }
-
-    #[inline(always)]
-    fn with_first([a, b, c]: [[f32; 8]; 3], rows: [&[f32; 8]; 8]) -> [[f32; 8]; 8] {
-        std::array::from_fn(|k| {
-            let [_, _, _, rest @ ..] = *rows[k];
-            let [d, e, f, g, h] = rest;
-            [a[k], b[k], c[k], d, e, f, g, h]
-        })
     }
 
     #[inline(always)]
@@ -178,6 +169,11 @@ impl Unit for Portable {
             }
         }
         packed
+    }
+
+    #[inline(always)]
+    fn shifted_left<const BITS: i32>(a: [u32; 8]) -> [u32; 8] {
+        a.map(|a| a << BITS)
     }
 
     #[inline(always)]

@@ -292,19 +292,17 @@ struct Pair<U: Unit> {
 mod tests {
     use super::*;
     use crate::Rng;
-    use crate::reconstruction::reproject::store::{Lit, Record, Sample, Surfel};
+    use crate::reconstruction::reproject::store::Sample;
 
     const SIZE: Size = Size { width: 40, height: 32 };
 
     /// A sample at every centre; the object by column and row.
     fn store(object: impl Fn(u32, u32) -> u32) -> Store {
-        let mut store = Store::new(SIZE, 1);
+        let mut store = Store::new(SIZE, 1, false);
         for y in 0..SIZE.height {
             for x in 0..SIZE.width {
                 let px = [x as f32 + 0.5, y as f32 + 0.5];
-                let record = Record([px[0], px[1], 1.0, f32::from_bits(1), 0.0, 0.0, 0.0, 0.0]);
-                let (surfel, lit) = (Surfel::default(), Lit::default());
-                let sample = Sample { object: object(x, y), record, surfel, lit };
+                let sample = Sample { object: object(x, y), ..Sample::at(px, 1.0, 1) };
                 store.insert(&sample, false);
             }
         }

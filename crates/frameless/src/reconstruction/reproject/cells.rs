@@ -1,6 +1,6 @@
 //! Cells to be changed while others change the cells before and behind them.
 
-use super::store::{self, EMPTY, Lit, Record, Store, Surfel};
+use super::store::{self, EMPTY, Record, Shading, Store, Surfel};
 use super::touched::Touched;
 use crate::{Surface, wide};
 
@@ -9,15 +9,17 @@ pub(super) struct Cells<'a> {
     pub(super) object: &'a mut [u32],
     pub(super) record: &'a mut [Record],
     pub(super) surfel: &'a mut [Surfel],
-    pub(super) lit: &'a mut [Lit],
+    /// As in the store, these may be empty.
+    pub(super) shading: &'a mut [Shading],
+    pub(super) primitive: &'a mut [u32],
     pub(super) touched: &'a Touched,
 }
 
 impl<'a> Cells<'a> {
     /// All of them.
     pub(super) fn of(store: &'a mut Store) -> Cells<'a> {
-        let Store { object, record, surfel, lit, touched, .. } = store;
-        Cells { object, record, surfel, lit, touched }
+        let Store { object, record, surfel, shading, primitive, touched, .. } = store;
+        Cells { object, record, surfel, shading, primitive, touched }
     }
 
     /// Takes the first `count` away, or all where there are fewer.
@@ -26,7 +28,8 @@ impl<'a> Cells<'a> {
             object: split_off(&mut self.object, count),
             record: split_off(&mut self.record, count),
             surfel: split_off(&mut self.surfel, count),
-            lit: split_off(&mut self.lit, count),
+            shading: split_off(&mut self.shading, count),
+            primitive: split_off(&mut self.primitive, count),
             touched: self.touched,
         }
     }
@@ -34,7 +37,17 @@ impl<'a> Cells<'a> {
     /// Where the sample in a cell is on its object.
     #[inline(always)]
     pub(super) fn surface(&self, i: usize) -> Surface {
-        store::surface(self.object[i], &self.record[i], &self.surfel[i])
+        store::surface(self.object[i], self.primitive(i), &self.surfel[i])
+    }
+
+    #[inline(always)]
+    pub(super) fn primitive(&self, i: usize) -> u32 {
+        self.primitive.get(i).copied().unwrap_or_default()
+    }
+
+    #[inline(always)]
+    pub(super) fn shading(&self, i: usize) -> Shading {
+        self.shading.get(i).copied().unwrap_or_default()
     }
 
     /// Begins to fetch what is in a cell.
@@ -42,8 +55,11 @@ impl<'a> Cells<'a> {
     pub(super) fn prefetch(&self, i: usize) {
         wide::prefetch(self.object, i);
         wide::prefetch(self.record, i);
+        wide::prefetch(self.record, i + 1);
         wide::prefetch(self.surfel, i);
-        wide::prefetch(self.lit, i);
+        if !self.shading.is_empty() {
+            wide::prefetch(self.shading, i);
+        }
     }
 
     #[inline(always)]

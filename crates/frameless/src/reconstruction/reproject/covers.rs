@@ -91,7 +91,7 @@ impl Covers {
         if matches!(store.object[cell], EMPTY | SCREEN) {
             return;
         }
-        let [x, y] = sample.record.px().map(|p| p as u32 / TILE);
+        let [x, y] = sample.px.map(|p| p as u32 / TILE);
         let tile = &mut self.tiles[(y * self.columns + x) as usize];
         if sample.record.depth() < COVERS * store.depth(cell) {
             if tile.covering == 0 {
@@ -294,25 +294,19 @@ fn take_away(store: &mut Store, [x0, y0]: [u32; 2], begun: Tick, limit: f32) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::store::{Lit, Record, Surfel};
     use super::*;
     use crate::tile::TileGrid;
 
     const SIZE: Size = Size { width: 64, height: 48 };
 
     fn sample(x: f32, y: f32, depth: f32, tick: u32) -> Sample {
-        let tick = f32::from_bits(tick);
-        Sample {
-            object: u32::from(depth < 5.0),
-            record: Record([x + 0.5, y + 0.5, depth, tick, 0.5, 0.5, 0.5, 0.0]),
-            surfel: Surfel::default(),
-            lit: Lit::default(),
-        }
+        let object = u32::from(depth < 5.0);
+        Sample { object, ..Sample::at([x + 0.5, y + 0.5], depth, tick) }
     }
 
     /// All is ten away; then every fifth pixel for which it is `near` is found to be one away, the others where they were.
     fn left_after(near: impl Fn(u32, u32) -> bool) -> Vec<(u32, u32)> {
-        let (mut store, mut covers) = (Store::new(SIZE, 1), Covers::default());
+        let (mut store, mut covers) = (Store::new(SIZE, 1, false), Covers::default());
         covers.fit(SIZE);
         let pixels = || (0..SIZE.height).flat_map(|y| (0..SIZE.width).map(move |x| (x, y)));
         for (x, y) in pixels() {
@@ -321,7 +315,7 @@ mod tests {
         for (x, y) in pixels().filter(|(x, y)| (x + 3 * y) % 5 == 0) {
             let depth = if near(x, y) { 1.0 } else { 10.0 };
             let new = sample(x as f32, y as f32, depth, 2);
-            let cell = store.layout.of_px(new.record.px()).expect("inside");
+            let cell = store.layout.of_px(new.px).expect("inside");
             covers.note(&store, cell, &new);
             store.insert(&new, false);
         }
@@ -360,7 +354,7 @@ mod tests {
 
     #[test]
     fn after_a_cut_a_few_pixels_of_every_block_are_probed() {
-        let (mut store, mut covers) = (Store::new(SIZE, 1), Covers::default());
+        let (mut store, mut covers) = (Store::new(SIZE, 1, false), Covers::default());
         covers.fit(SIZE);
         let pixels = || (0..SIZE.height).flat_map(|y| (0..SIZE.width).map(move |x| (x, y)));
         for (x, y) in pixels() {
@@ -386,7 +380,7 @@ mod tests {
         for &pixel in &first[..blocks] {
             let (x, y) = SIZE.xy(pixel);
             let new = sample(x as f32, y as f32, 1.0, 3);
-            covers.note(&store, store.layout.of_px(new.record.px()).expect("inside"), &new);
+            covers.note(&store, store.layout.of_px(new.px).expect("inside"), &new);
             store.insert(&new, false);
         }
         covers.run(&mut store);

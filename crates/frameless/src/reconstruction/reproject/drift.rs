@@ -128,19 +128,18 @@ fn drift(change: f32, light: f32, square: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::store::{Lit, Record, Sample, Surfel, Tick};
+    use super::super::store::{Record, Sample, Tick};
     use super::*;
 
     const SIZE: Size = Size { width: 16, height: 16 };
 
     /// A floor of two colours, all traced at time 0.
     fn floor() -> Store {
-        let mut store = Store::new(SIZE, 1);
+        let mut store = Store::new(SIZE, 1, false);
         for (y, x) in (0..16).flat_map(|y| (0..16).map(move |x| (y, x))) {
-            let [r, g, b] = colour(x, 1.0);
-            let record = Record([x as f32 + 0.5, y as f32 + 0.5, 1.0, 0.0, r, g, b, 0.0]);
-            let (surfel, lit) = (Surfel::default(), Lit::default());
-            store.insert(&Sample { object: 0, record, surfel, lit }, false);
+            let mut sample = Sample::at([x as f32 + 0.5, y as f32 + 0.5], 1.0, 0);
+            sample.record.set_rgb(colour(x, 1.0));
+            store.insert(&sample, false);
         }
         store
     }
@@ -165,7 +164,7 @@ mod tests {
                 let new = colour(x, light(secs, x));
                 drift.note([x, y], before, new, age_secs);
                 store.record[cell].set_rgb(new);
-                store.record[cell].0[3] = f32::from_bits(Tick::of(now).0);
+                store.record[cell].0[2] = f32::from_bits(Tick::of(now).0);
             }
             drift.run(&mut store, now, 1.0 / 60.0, |_| true);
         }

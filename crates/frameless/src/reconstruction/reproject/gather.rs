@@ -13,15 +13,14 @@
 
 use std::ops::Range;
 
-use super::fill::{self, AROUND};
+use super::fill::{self, AROUND, Far};
 use super::holes::{Hole, Waiting};
 use super::smooth::Smooth;
-use super::store::{self, CENTRAL_PX, EMPTY, Layout, Store, TICK_SECS, Tick, centres, distance2};
+use super::store::{self, CENTRAL_PX, EMPTY, Layout, Store, TICK_SECS, Tick};
 use super::touched::TILE;
 use crate::bands;
 use crate::rates::Rates;
-use crate::tile::TileGrid;
-use crate::traced::{Mark, TileMarks};
+use crate::traced::TileMarks;
 use crate::wide::{self, Around, F8, M8, Offsets, Planes, Unit};
 use crate::{Size, Time};
 
@@ -33,10 +32,8 @@ pub(super) struct Gather {
     pub(super) waiting: Waiting,
     /// Bit by bit for eight pixels of a row: which have a sample at their centre.
     central: Vec<u8>,
-    /// Per pixel the one whose sample it shows: itself, unless it is a hole.
-    source: Vec<u32>,
-    /// Holes that are not beside samples.
-    far: Vec<u32>,
+    /// The same: holes that are not beside samples.
+    far: Vec<u8>,
     smooth: Smooth,
     /// Of each tile.
     calm: Vec<Calm>,
@@ -75,11 +72,10 @@ type Calm = Option<Tick>;
 #[derive(Default)]
 struct Found {
     waiting: Waiting,
-    far: Vec<u32>,
     /// Scratch memory.
     rows: Rows,
     row: TileRow,
-    lines: [Line; 2],
+    unknown: Line,
 }
 
 /// Pixels of a row, with room for eight more than there can be.
@@ -118,7 +114,6 @@ impl Gather {
             means,
             waiting: Waiting::default(),
             central: Vec::new(),
-            source: Vec::new(),
             far: Vec::new(),
             smooth: Smooth::default(),
             calm: Vec::new(),
@@ -133,11 +128,11 @@ impl Gather {
     {
         let (size, threads) = (look.store.layout.size, look.threads);
         let prior = mean_of(shown.rgb);
-        self.source.resize(size.pixels(), fill::NOBODY);
-        self.far.clear();
         self.waiting.clear();
         let columns = size.width.div_ceil(TILE) as usize;
-        self.central.resize(columns * size.height as usize, 0);
+        for eights in [&mut self.central, &mut self.far] {
+            eights.resize(columns * size.height as usize, 0);
+        }
         self.calm.resize(columns * size.height.div_ceil(TILE) as usize, None);
         let cells = &[0, 1, 2].map(|turn| Cells::new(&look.store.layout, turn));
         let rows = bands::rows(size.height, threads);
@@ -148,41 +143,25 @@ impl Gather {
             .rgb
             .chunks_mut(band)
             .zip(shown.marks.chunks_mut(tiles))
-            .zip(self.source.chunks_mut(band))
+            .zip(self.far.chunks_mut(columns * rows as usize))
             .zip(self.central.chunks_mut(columns * rows as usize))
             .zip(self.calm.chunks_mut(tiles))
             .zip(&mut self.found);
         let bands = (0u32..).step_by(rows as usize).zip(bands).map(|(first_row, band)| {
-            let (((((rgb, marks), source), central), calm), found) = band;
+            let (((((rgb, marks), far), central), calm), found) = band;
             let shown = Shown { rgb, marks };
-            Blocks { look, cells, means, first_row, shown, source, central, calm, found }
+            Blocks { look, cells, means, first_row, shown, far, central, calm, found }
         });
         bands::run(threads, bands.collect(), wide::run);
         for found in &mut self.found {
             self.waiting.append(&mut found.waiting);
-            self.far.append(&mut found.far);
         }
-        self.fill_far(&look.rates.grid, prior, shown);
-    }
-
-    /// `prior`: what is shown where next to nothing is known.
-    fn fill_far(&mut self, grid: &TileGrid, prior: [f32; 3], shown: Shown<'_>) {
-        let size = grid.size;
-        if self.far.len() < size.pixels() {
-            self.smooth.run(size, &self.far, &self.source, prior, shown.rgb);
+        let far = Far::new(size, &self.far);
+        // What is shown where next to nothing is known.
+        if far.pixels.len() < size.pixels() {
+            self.smooth.run(&far, prior, shown.rgb);
         }
-        fill::nearest(size, &self.far, &mut self.source);
-        for &pixel in &self.far {
-            let mark = match self.source[pixel as usize] {
-                fill::NOBODY => Mark::default(),
-                source => {
-                    let place = grid.place(source);
-                    Mark(shown.marks[place.tile()].0[place.within()])
-                }
-            };
-            let place = grid.place(pixel);
-            shown.marks[place.tile()].0[place.within()] = mark.of_unknown().0;
-        }
+        fill::nearest(&look.rates.grid, &far, shown.marks);
     }
 
     /// Row by row, bit by bit for eight pixels at a time: which have a sample at their centre.
@@ -193,7 +172,7 @@ impl Gather {
 
 /// Rows of cells, as columns of numbers: of those of one row of pixels, and of the rows above and below it.
 ///
-/// Column and row in the picture, the bits of the object's number, the bits of the tick, red, green, blue.
+/// Column and row from the pixel's centre, the bits of the object's number, the bits of the tick, red, green, blue.
 #[derive(Default)]
 struct Rows([Vec<f32>; 7]);
 
@@ -219,7 +198,8 @@ impl Rows {
             let (records, _) = store.record[from..from + stride].as_chunks::<8>();
             let eights = objects.iter().zip(records).zip(wanted).zip((to..).step_by(8));
             for (((objects, records), _), at) in eights.filter(|((_, wanted), _)| **wanted) {
-                let [x, y, _, tick, r, g, b, _] = F8::<U>::columns(store::rows_of(records));
+                let [_, place, tick, r, g, b] = F8::<U>::six_columns(store::rows_of(records));
+                let [x, y] = store::offsets(place);
                 let object = M8::load(objects, 0).as_f32();
                 for (column, plane) in [x, y, object, tick, r, g, b].iter().zip(&mut self.0) {
                     column.store(plane, at);
@@ -234,15 +214,32 @@ struct Cells {
     /// Where the cells of the row begin.
     row: usize,
     own: Offsets,
-    /// Those of the 3×3 pixels around, and whether they are at most one cell away: all bits, or none.
+    /// Those of the 3×3 pixels around.
     around: Offsets,
-    are_near: Vec<u32>,
+    /// Of each of these.
+    beside: Vec<Beside>,
     /// Cells of the pixels [`AROUND`], one pixel after the other.
     pixels: Offsets,
-    /// To these, in pixels, modulo 2³².
-    to_pixels: [u32; AROUND.len()],
-    /// With one cell per pixel, of each of `around`: its place in [`AROUND`], beyond which the pixel itself is, and the way to it.
-    beside: Vec<(u32, u32)>,
+}
+
+/// A cell beside another.
+struct Beside {
+    /// From the one's pixel to the other's.
+    step: [f32; 2],
+    /// Whether it is at most one cell away: all bits, or none.
+    is_near: u32,
+    /// With one cell per pixel: its place in [`AROUND`], beyond which the pixel itself is.
+    nth: u32,
+}
+
+impl Beside {
+    /// Squared distance from the pixel's centre to a sample that is so far from its own pixel's.
+    #[inline(always)]
+    fn distance2<U: Unit>(&self, x: F8<U>, y: F8<U>) -> F8<U> {
+        let [step_x, step_y] = self.step;
+        let (dx, dy) = (x + F8::splat(step_x), y + F8::splat(step_y));
+        dx * dx + dy * dy
+    }
 }
 
 impl Cells {
@@ -266,20 +263,21 @@ impl Cells {
         };
         let around: Vec<(i32, i32)> = square(-n..2 * n, -n..2 * n).collect();
         let is_near = |d: i32| -1 <= d && d <= n;
-        let mask = |&(dx, dy): &(i32, i32)| u32::from(is_near(dx) && is_near(dy)).wrapping_neg();
-        let to_pixel = |[dx, dy]: [i32; 2]| (dy * layout.size.width as i32 + dx) as u32;
-        let place = |dx, dy| {
-            let place = AROUND.iter().position(|&to| to == [dx, dy]);
-            place.unwrap_or(AROUND.len()) as u32
+        let beside = |&(dx, dy): &(i32, i32)| {
+            let step = [dx, dy].map(|d| d.div_euclid(n));
+            let nth = AROUND.iter().position(|&to| to == step);
+            Beside {
+                step: step.map(|d| d as f32),
+                is_near: u32::from(is_near(dx) && is_near(dy)).wrapping_neg(),
+                nth: nth.unwrap_or(AROUND.len()) as u32,
+            }
         };
         Cells {
             row: row(turn),
             own: offsets(&pixel([0, 0])),
-            are_near: around.iter().map(mask).collect(),
+            beside: around.iter().map(beside).collect(),
             around: offsets(&around),
             pixels: offsets(&AROUND.map(pixel).concat()),
-            to_pixels: AROUND.map(to_pixel),
-            beside: around.iter().map(|&(dx, dy)| (place(dx, dy), to_pixel([dx, dy]))).collect(),
         }
     }
 }
@@ -326,7 +324,7 @@ struct Blocks<'a, F> {
     first_row: u32,
     /// Of the band's pixels, eights and tiles, as all below.
     shown: Shown<'a>,
-    source: &'a mut [u32],
+    far: &'a mut [u8],
     central: &'a mut [u8],
     calm: &'a mut [Calm],
     found: &'a mut Found,
@@ -349,7 +347,6 @@ struct Eight<U: Unit> {
     y: u32,
     /// The first cell of the first one, in [`Rows`].
     first: usize,
-    centre: [F8<U>; 2],
     model: Model<U>,
 }
 
@@ -359,9 +356,7 @@ struct AroundHoles<U: Unit> {
     object: M8<U>,
     /// Whether any pixel beside it has samples.
     any: M8<U>,
-    /// To the first of them in the order of [`AROUND`], in pixels.
-    offset: M8<U>,
-    /// When the newest sample of that was traced.
+    /// When the newest sample of the first of them in the order of [`AROUND`] was traced.
     tick: M8<U>,
 }
 
@@ -388,7 +383,7 @@ impl<F: Fn(u32) -> bool> wide::Task for Blocks<'_, F> {
         let mut row = std::mem::take(&mut self.found.row);
         near.fit(&self.look.store.layout);
         row.begin(width.div_ceil(TILE) as usize);
-        self.found.lines.iter_mut().for_each(|line| line.begin(width));
+        self.found.unknown.begin(width);
         for y in (self.first_row..last.min(height)).step_by(TILE as usize) {
             if row.find(&self, y / TILE) {
                 self.tile_row::<U>(&mut near, &row, y, last.min(y + TILE));
@@ -463,7 +458,6 @@ impl<F: Fn(u32) -> bool> Blocks<'_, F> {
                     x,
                     y,
                     first: near.cells.row + x as usize + 1,
-                    centre: centres(x, y),
                     model: Model::new(Tick::of(now), rates.of_tile(tile), contrast[tile]),
                 };
                 let oldest = self.block(&near, &eight);
@@ -471,9 +465,8 @@ impl<F: Fn(u32) -> bool> Blocks<'_, F> {
                 let before = if y % TILE == 0 { oldest } else { *calm };
                 *calm = before.zip(oldest).map(|(a, b)| if a.is_later_than(b) { b } else { a });
             }
-            let Found { waiting, far, lines: [unknown, others], .. } = &mut *self.found;
+            let Found { waiting, unknown, .. } = &mut *self.found;
             waiting.push(Hole::Unknown, unknown.take());
-            far.extend_from_slice(others.take());
         }
     }
 
@@ -486,13 +479,13 @@ impl<F: Fn(u32) -> bool> Blocks<'_, F> {
         let inside = M8::first_lanes(lanes);
         let holes = seen.object.equals(empty).and(inside);
         let object = seen.object;
-        let mut source = M8::new([0, 1, 2, 3, 4, 5, 6, 7]);
-        source = source.plus(M8::splat(size.index(eight.x, eight.y)));
+        let mut far = M8::splat(0);
         if holes.any() {
             let around = near.around_holes(eight);
             seen.object = around.object.or(holes, seen.object);
             seen.tick = around.tick.or(holes, seen.tick);
-            source = self.note_holes(source, holes, &around);
+            far = around.any.not().and(holes);
+            self.note_holes(eight, holes);
         }
         let good = seen.error.less_than(F8::splat(EXACT));
         let exact = if self.means { good } else { holes.not() };
@@ -500,7 +493,7 @@ impl<F: Fn(u32) -> bool> Blocks<'_, F> {
             let mean = near.mean(eight, seen.object, holes);
             seen.rgb = F8::all_or(seen.rgb, exact, mean);
         }
-        self.show(eight, &seen, source, holes, lanes);
+        self.show(eight, &seen, far, holes, lanes);
         if !seen.traced.either(inside.not()).all() {
             self.note_off_centre(eight, object.equals(empty).not().and(seen.traced.not()));
             return None;
@@ -514,43 +507,33 @@ impl<F: Fn(u32) -> bool> Blocks<'_, F> {
         &mut self,
         eight: &Eight<U>,
         seen: &Seen<U>,
-        source: M8<U>,
+        far: M8<U>,
         holes: M8<U>,
         lanes: usize,
     ) {
         let size = self.look.store.layout.size;
         let in_band = size.index(eight.x, eight.y) - self.first_row * size.width;
         let pixels = in_band as usize..in_band as usize + lanes;
-        let (mut rgb, room) = (F8::triples(seen.rgb), &mut self.shown.rgb[pixels.clone()]);
+        let (mut rgb, room) = (F8::triples(seen.rgb), &mut self.shown.rgb[pixels]);
         // What nothing is known of goes on showing what it has shown, until the larger holes are filled.
-        let far = source.equals(M8::splat(fill::NOBODY)).and(holes);
         far.for_each(|lane| rgb[lane] = room[lane]);
         put(room, &rgb);
-        put(&mut self.source[pixels], &source.lanes());
         let columns = size.width.div_ceil(TILE);
         let eights = (eight.y - self.first_row) * columns + eight.x / TILE;
         self.central[eights as usize] = seen.central.bits() as u8;
+        self.far[eights as usize] = far.bits() as u8;
         // A mask is −1 where it is set.
         let marks = seen.tick.plus(seen.tick).minus(holes);
         let tile = (eight.y - self.first_row) / TILE * columns + eight.x / TILE;
         marks.store(&mut self.shown.marks[tile as usize].0, (eight.y % TILE * TILE) as usize);
     }
 
-    /// Holes wait to be traced. Returns whose samples `pixels` show.
+    /// Holes wait to be traced.
     #[inline(always)]
-    fn note_holes<U: Unit>(
-        &mut self,
-        pixels: M8<U>,
-        holes: M8<U>,
-        around: &AroundHoles<U>,
-    ) -> M8<U> {
-        let far = around.any.not().and(holes);
-        let [to_unknown, to_far] = &mut self.found.lines;
-        to_unknown.push(pixels, holes.bits());
-        if far.any() {
-            to_far.push(pixels, far.bits());
-        }
-        M8::splat(fill::NOBODY).or(far, pixels.plus(around.offset.and(holes)))
+    fn note_holes<U: Unit>(&mut self, eight: &Eight<U>, holes: M8<U>) {
+        let first = self.look.store.layout.size.index(eight.x, eight.y);
+        let pixels = M8::<U>::new([0, 1, 2, 3, 4, 5, 6, 7]).plus(M8::splat(first));
+        self.found.unknown.push(pixels, holes.bits());
     }
 
     /// Those of the pixels whose object rests.
@@ -574,7 +557,7 @@ impl<U: Unit> Seen<U> {
         let [x, y, object, tick, rgb @ ..] = samples;
         let (object, tick) = (object.to_bits(), tick.to_bits());
         let (none, empty) = (M8::splat(0), M8::splat(EMPTY));
-        let distance2 = distance2([x, y], &eight.centre);
+        let distance2 = x * x + y * y;
         let is_sample = object.equals(empty).not();
         let central = distance2.less_than(F8::splat(CENTRAL_PX * CENTRAL_PX)).and(is_sample);
         let is_later = none.less_than(tick.minus(M8::splat(carried.0)));
@@ -634,25 +617,24 @@ impl Near<'_> {
             return AroundHoles { object: self.nearest(eight), ..self.beside(eight) };
         }
         let (none, empty) = (M8::splat(0), M8::splat(EMPTY));
-        let mut found = AroundHoles { object: empty, any: none, offset: none, tick: none };
+        let mut found = AroundHoles { object: empty, any: none, tick: none };
         let (mut least, mut first) = (F8::splat(f32::INFINITY), M8::splat(AROUND.len() as u32));
         let around = self.samples.around(eight.first, &self.cells.around);
-        for (k, &(nth, to_pixel)) in self.cells.beside.iter().enumerate() {
+        for (k, beside) in self.cells.beside.iter().enumerate() {
             // Nothing is in the pixels themselves.
-            if nth == AROUND.len() as u32 {
+            if beside.nth == AROUND.len() as u32 {
                 continue;
             }
             let [x, y, object, tick, ..] = around.load(k);
             let object = object.to_bits();
             let is_sample = object.equals(empty).not();
-            let distance2 = distance2([x, y], &eight.centre);
+            let distance2 = beside.distance2(x, y);
             let nearer = distance2.less_than(least).and(is_sample);
             least = distance2.or(nearer, least);
             found.object = object.or(nearer, found.object);
-            let nth = M8::splat(nth);
+            let nth = M8::splat(beside.nth);
             let is_first = nth.less_than(first).and(is_sample);
             first = nth.or(is_first, first);
-            found.offset = M8::splat(to_pixel).or(is_first, found.offset);
             found.tick = tick.to_bits().or(is_first, found.tick);
         }
         found.any = first.less_than(M8::splat(AROUND.len() as u32));
@@ -665,11 +647,11 @@ impl Near<'_> {
         let mut least = F8::splat(f32::INFINITY);
         let mut nearest = M8::splat(EMPTY);
         let around = self.samples.around(eight.first, &self.cells.around);
-        for k in 0..around.len() {
+        for (k, beside) in self.cells.beside.iter().enumerate() {
             let [x, y, object, ..] = around.load(k);
             let object = object.to_bits();
             let is_sample = object.equals(M8::splat(EMPTY)).not();
-            let distance2 = distance2([x, y], &eight.centre);
+            let distance2 = beside.distance2(x, y);
             let nearer = distance2.less_than(least).and(is_sample);
             least = distance2.or(nearer, least);
             nearest = object.or(nearer, nearest);
@@ -683,11 +665,11 @@ impl Near<'_> {
         let zero = F8::splat(0.0);
         let (mut red, mut green, mut blue, mut weights) = (zero, zero, zero, zero);
         let around = self.samples.around(eight.first, &self.cells.around);
-        for (k, &is_near) in self.cells.are_near.iter().enumerate() {
+        for (k, beside) in self.cells.beside.iter().enumerate() {
             let [x, y, other, tick, r, g, b] = around.load(k);
             let (other, tick) = (other.to_bits(), tick.to_bits());
-            let counts = other.equals(object).and(holes.either(M8::splat(is_near)));
-            let distance2 = distance2([x, y], &eight.centre);
+            let counts = other.equals(object).and(holes.either(M8::splat(beside.is_near)));
+            let distance2 = beside.distance2(x, y);
             let error = eight.model.error(distance2, tick) + eight.model.floor;
             let weight = (F8::splat(1.0) / (error * error)).or(counts, zero);
             weights = weights + weight;
@@ -702,13 +684,12 @@ impl Near<'_> {
     #[inline(always)]
     fn beside<U: Unit>(&self, eight: &Eight<U>) -> AroundHoles<U> {
         let (none, object) = (M8::splat(0), M8::splat(EMPTY));
-        let mut beside = AroundHoles { object, any: none, offset: none, tick: none };
+        let mut beside = AroundHoles { object, any: none, tick: none };
         let cells = self.samples.around(eight.first, &self.cells.pixels);
         let subs = cells.len() / AROUND.len();
-        for (nth, &offset) in self.cells.to_pixels.iter().enumerate() {
+        for nth in 0..AROUND.len() {
             let (is_known, newest) = newest(&cells, nth * subs..(nth + 1) * subs);
             let is_first = beside.any.equals(none).and(is_known);
-            beside.offset = beside.offset.either(is_first.and(M8::splat(offset)));
             beside.tick = beside.tick.either(is_first.and(newest));
             beside.any = beside.any.either(is_known);
         }

@@ -13,6 +13,7 @@
 //! two) are spread evenly over the picture; samples off their centre come last.
 
 use crate::bayer;
+use crate::spare::{give_back, give_back_but};
 use crate::tile::TileGrid;
 
 /// Why a pixel is to be traced.
@@ -85,10 +86,15 @@ impl Waiting {
         self.found[hole as usize].extend_from_slice(pixels);
     }
 
-    /// What others found after these.
+    /// What others found after these, who keep none.
     pub(super) fn append(&mut self, later: &mut Waiting) {
         for (found, later) in self.found.iter_mut().zip(&mut later.found) {
-            found.append(later);
+            match found.is_empty() {
+                true => std::mem::swap(found, later),
+                false => found.append(later),
+            }
+            give_back(found);
+            give_back_but(later, found.len());
         }
     }
 

@@ -69,7 +69,6 @@ pub struct Reproject {
     /// How many pixels had no sample at the last refresh.
     unknown: usize,
     contrast: Vec<f32>,
-    holes: Vec<u32>,
     edges: Vec<u32>,
     covered: Vec<Vec<u32>>,
     no_rates: Option<Rates>,
@@ -82,7 +81,7 @@ impl Reproject {
         let mut new = Reproject {
             options,
             cells,
-            store: Store::new(Size::new(1, 1), cells),
+            store: Store::new(Size::new(1, 1), cells, options.relight),
             warp: Default::default(),
             gather: gather::Gather::new(options.without != Some(ReprojectStage::Gather)),
             relight: Default::default(),
@@ -101,7 +100,6 @@ impl Reproject {
             knows_lights: false,
             unknown: 0,
             contrast: Vec::new(),
-            holes: Vec::new(),
             edges: Vec::new(),
             covered: Vec::new(),
             no_rates: None,
@@ -112,7 +110,7 @@ impl Reproject {
 
     /// Nothing kept in a picture of that size.
     fn begin(&mut self, size: Size) {
-        self.store = Store::new(size, self.cells);
+        self.store = Store::new(size, self.cells, self.options.relight);
         self.warp = Default::default();
         self.refreshes = 0;
         self.unknown = 0;
@@ -147,12 +145,12 @@ impl Reproject {
 
     /// Whoever is in a new sample's cell and moves will be somewhere else at the next refresh.
     fn make_room(&mut self, sample: &store::Sample) {
-        let Some(cell) = self.store.layout.of_px(sample.record.px()) else { return };
+        let Some(cell) = self.store.layout.of_px(sample.px) else { return };
         if self.refreshes >= 2 {
             self.covers.note(&self.store, cell, sample);
             let object = self.store.object[cell];
             if !self.settled.rests(object) {
-                self.warp.displace(&mut self.store, cell);
+                self.warp.displace(&mut self.store, cell, sample.px);
             } else if object == sample.object {
                 self.shadows.note(&self.store, cell, sample);
             }
@@ -200,7 +198,7 @@ impl Reconstruction for Reproject {
                 findings.refinements.push(Some(refinement));
                 continue;
             }
-            let mut sample = store::Sample::new(kept, i, display);
+            let mut sample = store::Sample::new(kept, i, display, self.options.relight);
             let found = self.residual(&sample, kept, i, display);
             sample.record.set_depth(found.depth);
             self.make_room(&sample);
@@ -230,12 +228,16 @@ impl Reconstruction for Reproject {
         self.options.relight
     }
 
-    fn refresh(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas, picture: &mut Vec<[f32; 3]>) {
+    fn refresh(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas) {
         self.fit(canvas.size());
         self.carry(refresh);
         self.light(refresh);
-        self.show(refresh, canvas, picture);
+        self.show(refresh, canvas);
         self.tell(refresh, canvas);
+    }
+
+    fn picture(&self) -> &[[f32; 3]] {
+        &self.shown
     }
 }
 
@@ -251,11 +253,12 @@ impl Reproject {
         self.interval_secs = refresh.now.secs_since(self.shown_at) as f32;
         self.refreshes += 1;
         self.shown_at = refresh.now;
+        self.store.keep_primitives(self.poses[0].deformed.iter().any(Option::is_some));
         // Nothing is known to move before the second refresh.
         let before = &self.poses[usize::from(self.refreshes >= 2)];
         self.settled.find_moved([&self.poses[0], before]);
         if refresh.is_noisy {
-            self.settled.hand_over(&mut self.store, refresh.display);
+            self.settled.hand_over(&mut self.store, &self.relight, refresh.display);
         }
         if !self.settled.any_rests() {
             self.store.touched.mark_all();
@@ -298,7 +301,7 @@ impl Reproject {
     }
 
     /// The picture, and what waits to be traced.
-    fn show(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas, picture: &mut Vec<[f32; 3]>) {
+    fn show(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas) {
         let (size, wanted) = (canvas.size(), self.samples_wanted(refresh));
         let rates = refresh.rates.unwrap_or_else(|| {
             self.no_rates.get_or_insert_with(|| Rates::new(TileGrid::new(size, touched::TILE)))
@@ -312,7 +315,7 @@ impl Reproject {
             self.shown = canvas.rgb().iter().map(|&rgb| refresh.display.encode(rgb)).collect();
             tile_contrast(&self.shown, &rates.grid, &mut self.contrast);
         }
-        let mut marks = canvas.lend();
+        let (mut marks, mut holes) = canvas.lend();
         let recentres = self.options.without != Some(ReprojectStage::Recentre);
         let rests = |object| self.settled.rests(object);
         let look = gather::Look {
@@ -337,9 +340,8 @@ impl Reproject {
         }
         let grid = TileGrid::new(size, touched::TILE);
         tile_contrast(&self.shown, &grid, &mut self.contrast);
-        self.gather.waiting.order(&grid, &self.contrast, &mut self.holes);
-        canvas.update(refresh.now, &mut self.holes, &mut marks);
-        picture.clone_from(&self.shown);
+        self.gather.waiting.order(&grid, &self.contrast, &mut holes);
+        canvas.update(refresh.now, marks, holes);
     }
 
     /// Where what was known has gone at once (a cut, a jump), what is left is looked at again, too; so are places before which something
@@ -393,14 +395,13 @@ mod tests {
             self.0.aim(now, canvas, requests);
         }
 
-        fn refresh(
-            &mut self,
-            refresh: &Refresh<'_>,
-            canvas: &mut Canvas,
-            picture: &mut Vec<[f32; 3]>,
-        ) {
+        fn refresh(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas) {
             self.0.store.touched.mark_all();
-            self.0.refresh(refresh, canvas, picture);
+            self.0.refresh(refresh, canvas);
+        }
+
+        fn picture(&self) -> &[[f32; 3]] {
+            self.0.picture()
         }
     }
 

@@ -7,7 +7,7 @@
 //! What the object emits and reflects, and ambient light, stay as they were until the pixel is traced again; so do shadows.
 
 use super::shade;
-use super::store::{EMPTY, Layout, Lit, Record, Sample, Store, Surfel};
+use super::store::{EMPTY, Layout, Record, Sample, Shading, Store, Surfel};
 use crate::wide::{self, M8, Unit};
 use crate::{Display, Light, Lighting, Surface, bands};
 
@@ -26,21 +26,30 @@ pub(super) struct Relight {
 pub(super) fn relit(
     object: u32,
     surfel: &Surfel,
-    lit: &Lit,
+    shading: &Shading,
     lighting: &Lighting,
 ) -> Option<[f32; 3]> {
-    let surface = Surface {
-        object,
-        position: surfel.position(),
-        normal: surfel.normal().unpack(),
-        albedo: surfel.albedo().unpack(),
-        lit: lit.lit,
-        ..Surface::default()
-    };
-    let (then, direct) = (surfel.linear(), lighting.direct(&surface)?);
-    let now = |k| then[k] - lit.direct[k] + direct[k];
+    let (indirect, direct) = (shading.indirect(), direct(object, surfel, shading, lighting)?);
+    let now = |k: usize| indirect[k] + direct[k];
     // Not `max`, which may say −0.
     Some(std::array::from_fn(|k| if now(k) > 0.0 { now(k) } else { 0.0 }))
+}
+
+/// The part of that which comes from the lights.
+fn direct(
+    object: u32,
+    surfel: &Surfel,
+    shading: &Shading,
+    lighting: &Lighting,
+) -> Option<[f32; 3]> {
+    lighting.direct(&Surface {
+        object,
+        position: surfel.position(),
+        normal: shading.normal().unpack(),
+        albedo: shading.albedo().unpack(),
+        lit: shading.lit(),
+        ..Surface::default()
+    })
 }
 
 impl Relight {
@@ -50,14 +59,33 @@ impl Relight {
         if !self.has_changed(sample.object) {
             return sample.record.rgb();
         }
-        let Sample { object, record, surfel, lit } = sample;
-        relit(*object, surfel, lit, &self.shown).map_or(record.rgb(), |rgb| display.encode(rgb))
+        let Sample { object, record, surfel, shading, .. } = sample;
+        relit(*object, surfel, shading, &self.shown).map_or(record.rgb(), |rgb| display.encode(rgb))
     }
 
     /// Linear colour of the sample in a cell as it is shown.
     pub(super) fn linear(&self, store: &Store, cell: usize) -> [f32; 3] {
-        let surfel = &store.surfel[cell];
-        relit(store.object[cell], surfel, &store.lit[cell], &self.shown).unwrap_or(surfel.linear())
+        let (object, surfel) = (store.object[cell], &store.surfel[cell]);
+        let relit = |shading| relit(object, surfel, shading, &self.shown);
+        store.shading.get(cell).and_then(relit).unwrap_or_else(|| surfel.linear())
+    }
+
+    /// Gives the sample in a cell another linear colour, which it has under the lights of the last refresh.
+    pub(super) fn recolour(
+        &self,
+        store: &mut Store,
+        cell: usize,
+        rgb: [f32; 3],
+        display: &Display,
+    ) {
+        store.touch(cell);
+        store.record[cell].set_rgb(display.encode(rgb));
+        let (object, surfel) = (store.object[cell], &mut store.surfel[cell]);
+        *surfel = Surfel::new(surfel.position(), rgb);
+        if let Some(shading) = store.shading.get_mut(cell) {
+            let direct = direct(object, surfel, shading, &self.shown).unwrap_or_default();
+            shading.set_indirect(std::array::from_fn(|k| rgb[k] - direct[k]));
+        }
     }
 
     /// Whether any object's samples were shaded again at the last refresh.
@@ -104,7 +132,7 @@ impl Relight {
         let mut records = std::mem::take(&mut store.record);
         let shaded = &*store;
         let bands = records.chunks_mut(band).enumerate();
-        let bands = bands.map(|(nth, records)| Shading {
+        let bands = bands.map(|(nth, records)| Shade {
             relight: self,
             store: shaded,
             display,
@@ -117,7 +145,7 @@ impl Relight {
 }
 
 /// Shades the samples of some rows of cells, whose records are apart.
-struct Shading<'a> {
+struct Shade<'a> {
     relight: &'a Relight,
     store: &'a Store,
     display: &'a Display,
@@ -126,7 +154,7 @@ struct Shading<'a> {
     records: &'a mut [Record],
 }
 
-impl wide::Task for Shading<'_> {
+impl wide::Task for Shade<'_> {
     #[inline(always)]
     fn run<U: Unit>(mut self) {
         let stride = self.store.layout.stride;
@@ -141,11 +169,11 @@ impl wide::Task for Shading<'_> {
     }
 }
 
-impl Shading<'_> {
+impl Shade<'_> {
     /// Eight cells from the one with the record `start` on. Returns whether any has been shaded.
     #[inline(always)]
     fn eight<U: Unit>(&mut self, start: usize) -> bool {
-        let Shading { relight, store, display, first, .. } = *self;
+        let Shade { relight, store, display, first, .. } = *self;
         let cells = first + start..first + start + 8;
         let objects = M8::<U>::load(&store.object, first + start);
         let mut waiting = objects.equals(M8::splat(EMPTY)).not();
@@ -157,9 +185,9 @@ impl Shading<'_> {
             let place = relight.shown.world_from_object.get(object as usize).copied().flatten();
             let Some(place) = place.filter(|_| relight.has_changed(object)) else { continue };
             let (surfels, _) = store.surfel[cells.clone()].as_chunks::<8>();
-            let (lits, _) = store.lit[cells.clone()].as_chunks::<8>();
-            let linear =
-                shade::Eight::<U>::new(&surfels[0], &lits[0]).relit(&place, &relight.shown.lights);
+            let (shadings, _) = store.shading[cells.clone()].as_chunks::<8>();
+            let eight = shade::Eight::<U>::new(&surfels[0], &shadings[0]);
+            let linear = eight.relit(&place, &relight.shown.lights);
             let [r, g, b] = display.encode_eight(linear);
             let [r, g, b] = [r.lanes(), g.lanes(), b.lanes()];
             let records = &mut self.records[start..start + 8];

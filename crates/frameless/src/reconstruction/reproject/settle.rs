@@ -92,18 +92,25 @@ pub(super) fn mean(sum: [f32; 3], count: u16) -> [f32; 3] {
 }
 
 impl Settled {
+    /// Nothing is added up until [`Settled::show`] is asked for it.
     pub(super) fn fit(&mut self, size: Size) {
-        let grid = TileGrid::new(size, TILE);
-        self.count = vec![0; size.pixels()];
-        self.sum = vec![[0.0; 3]; size.pixels()];
-        self.spread = vec![0.0; size.pixels()];
-        self.encoded = vec![[0.0; 3]; size.pixels()];
-        self.noise = vec![0.0; grid.len()];
-        self.noise_samples = vec![0; grid.len()];
-        self.grid = Some(grid);
+        let (grid, moved) = (Some(TileGrid::new(size, TILE)), std::mem::take(&mut self.moved));
+        *self = Settled { grid, moved, sky_moved: self.sky_moved, ..Settled::default() };
     }
 
-    /// Of how many samples each pixel shows the mean; 0 where it is not at rest.
+    fn begin_to_add(&mut self, size: Size) {
+        if self.count.is_empty() {
+            let tiles = self.grid.as_ref().map_or(0, TileGrid::len);
+            self.count = vec![0; size.pixels()];
+            self.sum = vec![[0.0; 3]; size.pixels()];
+            self.spread = vec![0.0; size.pixels()];
+            self.encoded = vec![[0.0; 3]; size.pixels()];
+            self.noise = vec![0.0; tiles];
+            self.noise_samples = vec![0; tiles];
+        }
+    }
+
+    /// Of how many samples each pixel shows the mean; 0 where it is not at rest. Empty if nobody has asked for means.
     pub(super) fn counts(&self) -> &[u16] {
         &self.count
     }
@@ -124,7 +131,8 @@ impl Settled {
 
     /// Variance of the samples of a pixel in the tile, Σ over the channels, as far as it is known.
     pub(super) fn noise(&self, pixel: u32) -> f32 {
-        self.grid.as_ref().map_or(0.0, |grid| self.noise[grid.tile_of(pixel)])
+        let noise = |grid: &TileGrid| self.noise.get(grid.tile_of(pixel)).copied();
+        self.grid.as_ref().and_then(noise).unwrap_or(0.0)
     }
 
     fn begin(&mut self, pixel: usize, rgb: [f32; 3], display: &Display) {
@@ -241,13 +249,13 @@ impl Settled {
     }
 
     /// Samples that are about to be carried away take their pixel's mean with them.
-    pub(super) fn hand_over(&mut self, store: &mut Store, display: &Display) {
+    pub(super) fn hand_over(&mut self, store: &mut Store, relight: &Relight, display: &Display) {
         for pixel in 0..self.count.len() {
             if self.count[pixel] > 1 {
                 let (x, y) = store.layout.size.xy(pixel as u32);
                 let cell = store.central(x, y).filter(|&cell| !self.rests(store.object[cell]));
                 if let Some(cell) = cell {
-                    store.recolour(cell, self.mean(pixel), display);
+                    relight.recolour(store, cell, self.mean(pixel), display);
                     self.count[pixel] = 0;
                 }
             }
@@ -263,6 +271,7 @@ impl Settled {
         central: &[u8],
         picture: &mut [[f32; 3]],
     ) {
+        self.begin_to_add(store.layout.size);
         if !self.any_rests() && !refresh.is_noisy {
             return self.count.fill(0);
         }
@@ -302,7 +311,7 @@ impl Settled {
         });
         bands::run(refresh.threads, bands.collect(), wide::run);
         for (cell, rgb) in self.handed_back.iter_mut().flat_map(|cells| cells.drain(..)) {
-            store.recolour(cell, rgb, refresh.display);
+            relight.recolour(store, cell, rgb, refresh.display);
         }
         let mut left = std::mem::take(&mut self.left);
         for [x, y] in left.iter_mut().flat_map(|pixels| pixels.drain(..)) {
@@ -388,6 +397,7 @@ mod tests {
     fn settled() -> (Settled, Display) {
         let mut settled = Settled::default();
         settled.fit(Size::new(1, 1));
+        settled.begin_to_add(Size::new(1, 1));
         (settled, Display::default())
     }
 

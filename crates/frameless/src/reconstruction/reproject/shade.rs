@@ -1,6 +1,6 @@
 //! Shading stored surfaces again, eight at a time: what [`relight`](super::relight) does with one, step by step and bit by bit.
 
-use super::store::{Lit, Surfel};
+use super::store::{Shading, Surfel};
 use crate::wide::{F8, M8, Unit};
 use crate::{Light, Placement};
 
@@ -19,22 +19,19 @@ pub(super) struct Eight<U: Unit> {
 
 impl<U: Unit> Eight<U> {
     #[inline(always)]
-    pub(super) fn new(surfels: &[Surfel; 8], lits: &[Lit; 8]) -> Self {
+    pub(super) fn new(surfels: &[Surfel; 8], shadings: &[Shading; 8]) -> Self {
         let [a, b, c, d, e, f, g, h] = surfels;
-        let rows = [&a.0, &b.0, &c.0, &d.0, &e.0, &f.0, &g.0, &h.0];
-        let [x, y, z, red, green, blue, normal, albedo] = F8::columns(rows);
-        let (mut direct, mut lit) = ([[0.0; 8]; 3], [0; 8]);
-        for (lane, of) in lits.iter().enumerate() {
-            [direct[0][lane], direct[1][lane], direct[2][lane]] = of.direct;
-            lit[lane] = of.lit;
-        }
-        let [dr, dg, db] = direct;
+        let surfels = [&a.0, &b.0, &c.0, &d.0, &e.0, &f.0, &g.0, &h.0];
+        let [a, b, c, d, e, f, g, h] = shadings;
+        let shadings = [&a.0, &b.0, &c.0, &d.0, &e.0, &f.0, &g.0, &h.0];
+        let [x, y, z, _] = F8::four_columns(surfels);
+        let [red, green, blue, normal, albedo, lit] = F8::six_columns(shadings);
         Eight {
             position: [x, y, z],
             normal: unpacked_normal(normal.to_bits()),
             albedo: unpacked_albedo(albedo.to_bits()),
-            indirect: [red - F8::new(dr), green - F8::new(dg), blue - F8::new(db)],
-            lit: M8::new(lit),
+            indirect: [red, green, blue],
+            lit: lit.to_bits(),
         }
     }
 
@@ -110,7 +107,7 @@ fn arriving<U: Unit>(light: &Light, point: &Three<U>) -> (Three<U>, Three<U>) {
 fn unpacked_normal<U: Unit>(bits: M8<U>) -> Three<U> {
     let steps = F8::splat(super::packed::NORMAL_STEPS);
     let u = bits.shifted_right::<16>().to_f32() / steps;
-    let v = bits.times(M8::splat(1 << 16)).shifted_right::<16>().to_f32() / steps;
+    let v = bits.shifted_left::<16>().shifted_right::<16>().to_f32() / steps;
     let z = F8::splat(1.0) - u.abs() - v.abs();
     let fold = (F8::splat(0.0) - z).at_least(F8::splat(0.0));
     let (x, y) = (u - fold.with_sign_of(u), v - fold.with_sign_of(v));
@@ -148,15 +145,14 @@ fn splat<U: Unit>([x, y, z]: &[f32; 3]) -> Three<U> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::packed::{PackedAlbedo, PackedNormal};
     use super::super::relight::relit;
     use super::*;
     use crate::wide::{self, Task};
-    use crate::{Display, Lighting, Rng, ToneMap};
+    use crate::{Display, Lighting, Rng, Surface, ToneMap};
 
     struct Compare<'a> {
         surfels: &'a [Surfel; 8],
-        lits: &'a [Lit; 8],
+        shadings: &'a [Shading; 8],
         lighting: &'a Lighting,
         display: &'a Display,
     }
@@ -164,12 +160,13 @@ mod tests {
     impl Task for Compare<'_> {
         #[inline(always)]
         fn run<U: Unit>(self) {
-            let Compare { surfels, lits, lighting, display } = self;
+            let Compare { surfels, shadings, lighting, display } = self;
             let place = lighting.world_from_object[0].expect("the only object");
-            let eight = Eight::<U>::new(surfels, lits).relit(&place, &lighting.lights);
+            let eight = Eight::<U>::new(surfels, shadings).relit(&place, &lighting.lights);
             let encoded = display.encode_eight(eight);
             for lane in 0..8 {
-                let one = relit(0, &surfels[lane], &lits[lane], lighting).expect("is shaded again");
+                let one = relit(0, &surfels[lane], &shadings[lane], lighting);
+                let one = one.expect("is shaded again");
                 assert_eq!(eight.map(|c| c.lanes()[lane].to_bits()), one.map(f32::to_bits));
                 let one = display.encode(one);
                 assert_eq!(encoded.map(|c| c.lanes()[lane].to_bits()), one.map(f32::to_bits));
@@ -203,21 +200,23 @@ mod tests {
                 normal: [(); 3].map(|()| three(2.0)),
             };
             let lighting = Lighting { lights, world_from_object: vec![Some(place)] };
-            let surfels = [(); 8].map(|()| {
-                let ([x, y, z], [r, g, b], n) = (three(3.0), three(2.0), three(1.0));
+            let surfels = [(); 8].map(|()| Surfel::new(three(3.0), [0.0; 3]));
+            let shadings = std::array::from_fn(|lane| {
+                let (n, linear) = (three(1.0), three(2.0).map(f32::abs));
                 let length = n.iter().map(|n| n * n).sum::<f32>().sqrt();
-                let normal = PackedNormal::new(n.map(|n| n / length)).0;
-                let albedo = PackedAlbedo::new(three(2.0).map(f32::abs)).0;
-                let [normal, albedo] = [normal, albedo].map(f32::from_bits);
-                Surfel([x, y, z, r.abs(), g.abs(), b.abs(), normal, albedo])
-            });
-            let lits = std::array::from_fn(|lane| {
-                let lit = (round + lane as u32) % 8;
-                Lit { direct: three(1.0).map(f32::abs), lit }
+                let surface = Surface {
+                    normal: n.map(|n| n / length),
+                    albedo: three(2.0).map(f32::abs),
+                    direct: three(1.0).map(f32::abs),
+                    lit: (round + lane as u32) % 8,
+                    ..Surface::default()
+                };
+                Shading::new(&surface, linear)
             });
             for tone_map in [ToneMap::None, ToneMap::ALL[round as usize % ToneMap::ALL.len()]] {
                 let display = &Display::new(0.3).with_tone_map(tone_map);
-                wide::run(Compare { surfels: &surfels, lits: &lits, lighting: &lighting, display });
+                let (surfels, shadings, lighting) = (&surfels, &shadings, &lighting);
+                wide::run(Compare { surfels, shadings, lighting, display });
             }
         }
     }

@@ -14,7 +14,7 @@ const TILE: u32 = 16;
 #[derive(Default)]
 pub(super) struct Shadows {
     columns: u32,
-    /// Per tile, bit i: light i has begun or ceased to reach a point of it. Since the last refresh, and between the two before.
+    /// Per tile, bit i: light i, or i + 16, has begun or ceased to reach a point of it. Since the last refresh, and between the two before.
     seen: [Vec<u32>; 2],
     any: [bool; 2],
 }
@@ -33,11 +33,11 @@ impl Shadows {
     /// A new sample is about to take the cell of one of the same object, which rests.
     #[inline(always)]
     pub(super) fn note(&mut self, store: &Store, cell: usize, sample: &Sample) {
-        let changed = store.lit[cell].lit ^ sample.lit.lit;
-        let [[x0, y0], [x1, y1]] = [store.record[cell].px(), sample.record.px()];
+        let changed = store.record[cell].lit() ^ sample.record.lit();
+        let [[x0, y0], [x1, y1]] = [store.record[cell].offset(), sample.record.offset()];
         let [dx, dy] = [x0 - x1, y0 - y1];
         if changed != 0 && dx * dx + dy * dy < CENTRAL_PX * CENTRAL_PX {
-            let [x, y] = sample.record.px().map(|p| p as u32 / TILE);
+            let [x, y] = sample.px.map(|p| p as u32 / TILE);
             self.seen[0][(y * self.columns + x) as usize] |= changed;
             self.any[0] = true;
         }
@@ -46,6 +46,7 @@ impl Shadows {
     /// At a refresh: pixels at the edges of shadows of the lights that have `moved` (bits), and of all that were seen to move.
     pub(super) fn find_edges(&mut self, store: &Store, moved: u32, edges: &mut Vec<u32>) {
         edges.clear();
+        let moved = (moved | moved >> 16) & 0xffff;
         if moved != 0 || self.any != [false; 2] {
             let Size { width, height } = store.layout.size;
             for y0 in (0..height).step_by(TILE as usize) {
@@ -75,7 +76,8 @@ impl Shadows {
 fn find_in_tile(store: &Store, [x0, y0]: [u32; 2], lights: u32, edges: &mut Vec<u32>) {
     let (layout, Size { width, height }) = (store.layout, store.layout.size);
     let differ = |a: usize, b: usize| {
-        store.object[a] == store.object[b] && (store.lit[a].lit ^ store.lit[b].lit) & lights != 0
+        store.object[a] == store.object[b]
+            && (store.record[a].lit() ^ store.record[b].lit()) & lights != 0
     };
     for y in y0..(y0 + TILE).min(height) {
         for x in x0..(x0 + TILE).min(width) {
@@ -92,26 +94,26 @@ fn find_in_tile(store: &Store, [x0, y0]: [u32; 2], lights: u32, edges: &mut Vec<
 
 #[cfg(test)]
 mod tests {
-    use super::super::store::{Lit, Record, Surfel};
+    use super::super::store::{Record, Tick, from_centre};
     use super::*;
 
     const SIZE: Size = Size { width: 96, height: 32 };
 
     fn sample_at([x, y]: [f32; 2], lit: u32) -> Sample {
-        let record = Record([x, y, 1.0, f32::from_bits(1), 0.5, 0.5, 0.5, 0.0]);
-        let lit = Lit { lit, ..Lit::default() };
-        Sample { object: 0, record, surfel: Surfel::default(), lit }
+        let record = Record::new(from_centre([x, y]), 1.0, Tick(1), [0.5; 3], lit);
+        Sample { record, ..Sample::at([x, y], 1.0, 1) }
     }
 
     fn sample(x: u32, y: u32, lit: u32) -> Sample {
         sample_at([x as f32 + 0.5, y as f32 + 0.5], lit)
     }
 
-    /// A floor under two lights: what the first reaches ends between columns 3 and 4, and the second's between 87 and 88.
-    fn floor() -> Store {
-        let mut store = Store::new(SIZE, 1);
+    /// A floor under two lights: what the first reaches ends between columns 3 and 4, and the second's between 87 and 88. `others`: bits
+    /// of lights that there are not.
+    fn floor(others: u32) -> Store {
+        let mut store = Store::new(SIZE, 1, false);
         for (y, x) in (0..SIZE.height).flat_map(|y| (0..SIZE.width).map(move |x| (y, x))) {
-            store.insert(&sample(x, y, u32::from(x < 4) | u32::from(x < 88) << 1), false);
+            store.insert(&sample(x, y, others | u32::from(x < 4) | u32::from(x < 88) << 1), false);
         }
         store
     }
@@ -127,16 +129,18 @@ mod tests {
 
     #[test]
     fn edges_of_the_shadows_of_lights_that_move_are_found_everywhere() {
-        let (store, mut shadows) = (floor(), Shadows::default());
-        shadows.fit(SIZE);
-        assert_eq!(columns(&mut shadows, &store, 0), []);
-        assert_eq!(columns(&mut shadows, &store, 0b01), [3, 4]);
-        assert_eq!(columns(&mut shadows, &store, 0b11), [3, 4, 87, 88]);
+        for others in [0, !0b11] {
+            let (store, mut shadows) = (floor(others), Shadows::default());
+            shadows.fit(SIZE);
+            assert_eq!(columns(&mut shadows, &store, 0), []);
+            assert_eq!(columns(&mut shadows, &store, 0b01), [3, 4]);
+            assert_eq!(columns(&mut shadows, &store, 0b11), [3, 4, 87, 88]);
+        }
     }
 
     #[test]
     fn a_ray_that_finds_another_light_tells_of_the_edges_around_for_two_refreshes() {
-        let (store, mut shadows) = (floor(), Shadows::default());
+        let (store, mut shadows) = (floor(0), Shadows::default());
         shadows.fit(SIZE);
         let cell = store.layout.of_pixel(5, 5);
         let note = |shadows: &mut Shadows, x: f32, lit| {

@@ -15,8 +15,9 @@
 
 use std::ops::Range;
 
-use super::fill::NOBODY;
+use super::fill::Far;
 use crate::Size;
+use crate::spare::give_back;
 
 /// A colour and its weight.
 type Block = [f32; 4];
@@ -34,12 +35,17 @@ fn enough(bits: usize) -> f32 {
     ENOUGH[usize::from(bits > TILE_BITS)]
 }
 
-/// Blocks of 2^l × 2^l pixels, row by row.
+/// Blocks of 2^l × 2^l pixels.
 #[derive(Default)]
 struct Level {
     columns: usize,
     rows: usize,
+    /// Row by row: of the whole picture, or of those tiles that have any, one after the other.
     blocks: Vec<Block>,
+    /// Of blocks smaller than tiles: how many there are in a row of a tile, as a power of two; 0: they are of the whole picture.
+    side_bits: usize,
+    /// Per tile where its blocks begin.
+    first: Vec<u32>,
 }
 
 /// Fills large holes.
@@ -53,21 +59,15 @@ pub(super) struct Smooth {
 }
 
 impl Smooth {
-    /// `far`: the holes, which are [`NOBODY`] in `source`.
-    pub(super) fn run(
-        &mut self,
-        size: Size,
-        far: &[u32],
-        source: &[u32],
-        prior: [f32; 3],
-        picture: &mut [[f32; 3]],
-    ) {
-        if far.is_empty() {
+    pub(super) fn run(&mut self, far: &Far<'_>, prior: [f32; 3], picture: &mut [[f32; 3]]) {
+        if far.pixels.is_empty() {
             return;
         }
+        let size = far.size;
         self.fit(size);
-        self.find_tiles(size, far);
-        self.pull_tiles(size, source, picture);
+        self.find_tiles(size, &far.pixels);
+        self.make_room();
+        self.pull_tiles(far, picture);
         for l in TILE_BITS..self.levels.len() {
             let (finer, coarser) = self.levels.split_at_mut(l);
             let (finer, coarser) = (&finer[l - 1], &mut coarser[0]);
@@ -76,7 +76,7 @@ impl Smooth {
         let top = self.levels.last_mut().expect("a tile at least");
         top.blocks.iter_mut().for_each(|block| *block = mixed(*block, prior));
         self.push();
-        for &pixel in far {
+        for &pixel in &far.pixels {
             let (x, y) = size.xy(pixel);
             picture[pixel as usize] = self.levels[0].between(x as usize, y as usize);
         }
@@ -88,7 +88,25 @@ impl Smooth {
         for (level, bits) in self.levels.iter_mut().zip(1..) {
             level.columns = (size.width as usize).div_ceil(1 << bits);
             level.rows = (size.height as usize).div_ceil(1 << bits);
-            level.blocks.resize(level.columns * level.rows, [0.0; 4]);
+            level.side_bits = TILE_BITS.saturating_sub(bits);
+            if level.side_bits == 0 {
+                level.blocks.resize(level.columns * level.rows, [0.0; 4]);
+            }
+        }
+    }
+
+    /// For blocks smaller than tiles, where they are looked at.
+    fn make_room(&mut self) {
+        for level in &mut self.levels[..TILE_BITS - 1] {
+            let (per_tile, mut room) = (1 << (2 * level.side_bits), 0);
+            level.first.clear();
+            level.first.extend(self.near.iter().map(|&is_near| {
+                let first = room;
+                room += if is_near { per_tile } else { 0 };
+                first as u32
+            }));
+            level.blocks.resize(room, [0.0; 4]);
+            give_back(&mut level.blocks);
         }
     }
 
@@ -113,11 +131,11 @@ impl Smooth {
     }
 
     /// Up to the blocks that are tiles.
-    fn pull_tiles(&mut self, size: Size, source: &[u32], picture: &[[f32; 3]]) {
-        let width = size.width as usize;
+    fn pull_tiles(&mut self, far: &Far<'_>, picture: &[[f32; 3]]) {
+        let (size, width) = (far.size, far.size.width as usize);
         let pixel = |x: usize, y: usize| {
-            let ([r, g, b], i) = (picture[y * width + x], y * width + x);
-            [r, g, b, if source[i] == NOBODY { 0.0 } else { 1.0 }]
+            let [r, g, b] = picture[y * width + x];
+            [r, g, b, if far.has(x, y) { 0.0 } else { 1.0 }]
         };
         let (fine, tiles) = self.levels.split_at_mut(TILE_BITS - 1);
         let Level { columns, ref mut blocks, .. } = tiles[0];
@@ -134,7 +152,7 @@ impl Smooth {
             };
             for (y, x) in pairs(halved(&ys, 1), halved(&xs, 1)) {
                 let children = pairs(twice(y, ys.end), twice(x, xs.end)).map(|(y, x)| pixel(x, y));
-                fine[0].blocks[y * fine[0].columns + x] = pulled(enough(1), children);
+                fine[0].set(x, y, pulled(enough(1), children));
             }
             for l in 1..TILE_BITS - 1 {
                 let (finer, coarser) = fine.split_at_mut(l);
@@ -176,19 +194,42 @@ impl Smooth {
 }
 
 impl Level {
+    /// Where a block is in memory.
+    #[inline]
+    fn place(&self, x: usize, y: usize) -> usize {
+        let bits = self.side_bits;
+        if bits == 0 {
+            return y * self.columns + x;
+        }
+        let (columns, last) = (self.columns.div_ceil(1 << bits), (1 << bits) - 1);
+        let first = self.first[(y >> bits) * columns + (x >> bits)] as usize;
+        first + ((y & last) << bits | (x & last))
+    }
+
+    #[inline]
+    fn at(&self, x: usize, y: usize) -> Block {
+        self.blocks[self.place(x, y)]
+    }
+
+    #[inline]
+    fn set(&mut self, x: usize, y: usize, block: Block) {
+        let place = self.place(x, y);
+        self.blocks[place] = block;
+    }
+
     /// From the next finer level.
     fn pull(&mut self, k: f32, finer: &Level, columns: Range<usize>, rows: Range<usize>) {
         for (y, x) in pairs(rows, columns) {
-            self.blocks[y * self.columns + x] = pulled(k, finer.children(x, y));
+            self.set(x, y, pulled(k, finer.children(x, y)));
         }
     }
 
     /// From the next coarser level.
     fn push(&mut self, coarser: &Level, columns: Range<usize>, rows: Range<usize>) {
         for (y, x) in pairs(rows, columns) {
-            let block = &mut self.blocks[y * self.columns + x];
+            let block = self.at(x, y);
             if block[3] < 1.0 {
-                *block = mixed(*block, coarser.between(x, y));
+                self.set(x, y, mixed(block, coarser.between(x, y)));
             }
         }
     }
@@ -196,7 +237,7 @@ impl Level {
     /// Of a block of the next coarser level.
     fn children(&self, x: usize, y: usize) -> impl Iterator<Item = Block> {
         let children = pairs(twice(y, self.rows), twice(x, self.columns));
-        children.map(|(y, x)| self.blocks[y * self.columns + x])
+        children.map(|(y, x)| self.at(x, y))
     }
 
     /// Interpolated at the centre of a block, or pixel, of the next finer level: a quarter of a block beside that of its own.
@@ -206,8 +247,7 @@ impl Level {
             [i / 2, beside.min(end - 1)]
         };
         let ([x, u], [y, v]) = (own_and_beside(x, self.columns), own_and_beside(y, self.rows));
-        let at = |x, y| self.blocks[y * self.columns + x];
-        let [a, b, c, d] = [at(x, y), at(u, y), at(x, v), at(u, v)];
+        let [a, b, c, d] = [self.at(x, y), self.at(u, y), self.at(x, v), self.at(u, v)];
         std::array::from_fn(|k| (9.0 * a[k] + 3.0 * (b[k] + c[k]) + d[k]) * (1.0 / 16.0))
     }
 }
@@ -253,9 +293,12 @@ mod tests {
     ) -> Vec<(u32, u32, f32)> {
         let pixels = 0..SIZE.pixels() as u32;
         let is_known = |&pixel: &u32| known(SIZE.xy(pixel).0, SIZE.xy(pixel).1);
-        let far: Vec<u32> = pixels.clone().filter(|pixel| !is_known(pixel)).collect();
-        let source: Vec<u32> =
-            pixels.clone().map(|pixel| if is_known(&pixel) { pixel } else { NOBODY }).collect();
+        let columns = SIZE.width.div_ceil(8);
+        let mut eights = vec![0; (columns * SIZE.height) as usize];
+        for (x, y) in pixels.clone().filter(|pixel| !is_known(pixel)).map(|pixel| SIZE.xy(pixel)) {
+            eights[(y * columns + x / 8) as usize] |= 1 << (x % 8);
+        }
+        let far = Far::new(SIZE, &eights);
         let shown = |pixel| {
             let (x, y) = SIZE.xy(pixel);
             if known(x, y) { [colour(x, y); 3] } else { [f32::NAN; 3] }
@@ -263,9 +306,9 @@ mod tests {
         // What was there before counts nothing, as long as it is a number.
         let mut picture: Vec<[f32; 3]> =
             pixels.map(|pixel| shown(pixel).map(|c| if c.is_nan() { 99.0 } else { c })).collect();
-        Smooth::default().run(SIZE, &far, &source, [prior; 3], &mut picture);
+        Smooth::default().run(&far, [prior; 3], &mut picture);
         let now = |&pixel: &u32| (SIZE.xy(pixel).0, SIZE.xy(pixel).1, picture[pixel as usize][0]);
-        far.iter().map(now).collect()
+        far.pixels.iter().map(now).collect()
     }
 
     #[test]

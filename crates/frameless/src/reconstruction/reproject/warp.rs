@@ -14,7 +14,8 @@ use std::ops::Range;
 use std::sync::Mutex;
 
 use super::cells::Cells;
-use super::store::{self, Layout, Lit, Record, SCREEN, Store, Surfel};
+use super::store::{self, Layout, Record, SCREEN, Shading, Store, Surfel};
+use crate::spare::give_back_but;
 use crate::{Pose, bands, wide};
 
 use carry::{Band, Carry, Lifted};
@@ -34,20 +35,17 @@ const AHEAD: usize = 12;
 /// So many displaced samples are carried at a time.
 const CHUNK: usize = 4096;
 
-/// Scratch memory.
+/// See the module.
 #[derive(Default)]
 pub(super) struct Warp {
     /// Samples that move, and whose cells others have taken since the last refresh.
     displaced: Vec<Mover>,
-    /// Of each band.
-    moved: Vec<Moved>,
-    /// Rows of each thread.
-    lifted: Mutex<Vec<Lifted>>,
-    losers: Vec<Loser>,
+    /// How many have lost their cells at the last refresh, at the most in a band. Room for them, and for what has been lifted, is kept
+    /// no longer than a refresh takes: it may be as much as a fifth of the store.
+    losers: usize,
 }
 
 /// What is left to do when samples of a band have been carried.
-#[derive(Default)]
 struct Moved {
     /// Samples that came to another band, or to a row that had not been lifted.
     early: Vec<(u32, Mover)>,
@@ -57,19 +55,24 @@ struct Moved {
 /// One sample on its way.
 #[derive(Clone, Copy)]
 struct Mover {
+    /// Where in the picture, in pixels; [`GONE_PX`] outside.
+    px: [f32; 2],
+    object: u32,
+    primitive: u32,
     record: Record,
     surfel: Surfel,
-    lit: Lit,
-    object: u32,
+    shading: Shading,
 }
 
 /// The same, where it is kept meanwhile.
 #[derive(Clone, Copy)]
 struct Moving<'a> {
+    px: [f32; 2],
+    object: u32,
+    primitive: u32,
     record: &'a Record,
     surfel: &'a Surfel,
-    lit: &'a Lit,
-    object: u32,
+    shading: &'a Shading,
 }
 
 /// Who lost its cell, and the one beside it where there may be room.
@@ -78,16 +81,16 @@ type Loser = (u32, Mover);
 impl Mover {
     #[inline(always)]
     fn moving(&self) -> Moving<'_> {
-        let Mover { record, surfel, lit, object } = self;
-        Moving { record, surfel, lit, object: *object }
+        let Mover { px, object, primitive, record, surfel, shading } = self;
+        Moving { px: *px, object: *object, primitive: *primitive, record, surfel, shading }
     }
 }
 
 impl Moving<'_> {
     #[inline(always)]
     fn mover(&self) -> Mover {
-        let Moving { record, surfel, lit, object } = *self;
-        Mover { record: *record, surfel: *surfel, lit: *lit, object }
+        let Moving { px, object, primitive, record, surfel, shading } = *self;
+        Mover { px, object, primitive, record: *record, surfel: *surfel, shading: *shading }
     }
 }
 
@@ -100,17 +103,20 @@ impl Warp {
         threads: usize,
         rests: impl Fn(u32) -> bool + Sync,
     ) {
-        self.carry_bands(store, pose, threads, rests);
+        let mut bands = self.carry_bands(store, pose, threads, rests);
         self.carry_displaced(pose, threads);
-        self.put_down_early(store);
-        self.step_aside(store);
+        let late = self.put_down_early(store, &mut bands);
+        self.losers = bands.iter().map(|band| band.losers.len()).max().unwrap_or(0);
+        let of_bands = bands.iter().map(|band| &band.losers);
+        of_bands.chain([&late]).for_each(|losers| step_aside(store, losers));
     }
 
     /// Takes the sample in a cell away until the next refresh: it moves, and somebody else is there now. Beyond as many as there are
     /// cells, while nobody asks for a picture, samples are lost.
-    pub(super) fn displace(&mut self, store: &mut Store, cell: usize) {
+    /// `px`: of the other.
+    pub(super) fn displace(&mut self, store: &mut Store, cell: usize, px: [f32; 2]) {
         if self.displaced.len() < store.layout.len() {
-            self.displaced.push(at(&Cells::of(store), cell));
+            self.displaced.push(at(&Cells::of(store), cell, px));
             store.remove(cell);
         }
     }
@@ -120,20 +126,23 @@ impl Warp {
     }
 
     fn carry_bands(
-        &mut self,
+        &self,
         store: &mut Store,
         pose: &Pose,
         threads: usize,
         rests: impl Fn(u32) -> bool + Sync,
-    ) {
+    ) -> Vec<Moved> {
         let (layout, rests) = (store.layout, &rests);
         let height = layout.size.height as usize;
         // With several cells per pixel those of a row do not lie together.
         let rows = if layout.per_side == 1 { BAND_ROWS } else { height };
-        self.moved.resize_with(height.div_ceil(rows), Moved::default);
+        let new = || Moved { early: Vec::new(), losers: Vec::with_capacity(self.losers) };
+        let mut moved: Vec<Moved> = (0..height.div_ceil(rows)).map(|_| new()).collect();
+        // Rows of each thread.
+        let lifted = Mutex::<Vec<Lifted>>::default();
         let mut rest = Cells::of(store);
         rest.split_off_first(layout.row(0));
-        let bands = self.moved.iter_mut().zip((0..height).step_by(rows)).map(|(moved, row)| {
+        let bands = moved.iter_mut().zip((0..height).step_by(rows)).map(|(moved, row)| {
             let rows = row..(row + rows).min(height);
             let count = if layout.per_side == 1 { rows.len() * layout.stride } else { usize::MAX };
             let cells = rest.split_off_first(count);
@@ -141,10 +150,11 @@ impl Warp {
             Band { rows: rows.start as i32..rows.end as i32, cells, first, moved }
         });
         bands::run(threads, bands.collect(), |band| {
-            let mut lifted = with(&self.lifted, Vec::pop).unwrap_or_default();
-            wide::run(Carry { layout, pose, rests, band, lifted: &mut lifted });
-            with(&self.lifted, |unused| unused.push(lifted));
+            let mut rows = with(&lifted, Vec::pop).unwrap_or_default();
+            wide::run(Carry { layout, pose, rests, band, lifted: &mut rows });
+            with(&lifted, |unused| unused.push(rows));
         });
+        moved
     }
 
     /// To where their surfaces are now, or out of the picture.
@@ -152,55 +162,63 @@ impl Warp {
         let chunks = self.displaced.chunks_mut(CHUNK).collect();
         bands::run(threads, chunks, |chunk: &mut [Mover]| {
             for mover in chunk {
-                let surface = store::surface(mover.object, &mover.record, &mover.surfel);
+                let surface = store::surface(mover.object, mover.primitive, &mover.surfel);
                 match pose.project(&surface) {
                     Some(there) => {
-                        mover.record.set_px(there.px);
+                        mover.px = there.px;
+                        mover.record.set_offset(store::from_centre(there.px));
                         mover.record.set_depth(there.depth);
                     }
-                    None => mover.record.set_px([GONE_PX; 2]),
+                    None => mover.px = [GONE_PX; 2],
                 }
             }
         });
     }
 
-    fn put_down_early(&mut self, store: &mut Store) {
-        let Warp { displaced, moved, losers, .. } = self;
+    /// Returns who loses a cell by that.
+    fn put_down_early(&mut self, store: &mut Store, bands: &mut [Moved]) -> Vec<Loser> {
+        let (displaced, losers) = (&mut self.displaced, &mut Vec::new());
         let layout = store.layout;
         let cells = &mut Cells::of(store);
-        moved.iter_mut().for_each(|band| losers.append(&mut band.losers));
         let everywhere = &(0..layout.plane as u32);
-        for (cell, mover) in moved.iter_mut().flat_map(|band| band.early.drain(..)) {
+        for (cell, mover) in bands.iter_mut().flat_map(|band| band.early.drain(..)) {
             let mut losing = Losing { layout: &layout, lifted: everywhere, first: 0, losers };
             put_down(cells, cell as usize, &mover.moving(), &mut losing);
         }
         for (i, mover) in displaced.iter().enumerate() {
             if let Some(later) = displaced.get(i + AHEAD)
-                && let Some(cell) = layout.of_px(later.record.px())
+                && let Some(cell) = layout.of_px(later.px)
             {
                 cells.prefetch(cell);
             }
-            if let Some(cell) = layout.of_px(mover.record.px()) {
+            if let Some(cell) = layout.of_px(mover.px) {
                 let mut losing = Losing { layout: &layout, lifted: everywhere, first: 0, losers };
                 put_down(cells, cell, &mover.moving(), &mut losing);
             }
         }
+        let used = displaced.len();
         displaced.clear();
+        give_back_but(displaced, used);
+        std::mem::take(losers)
     }
+}
 
-    /// Who lost its cell to a sample of the same surface goes to the one beside it, if that is empty.
-    fn step_aside(&mut self, store: &mut Store) {
-        let cells = &mut Cells::of(store);
-        for (i, (cell, loser)) in self.losers.iter().enumerate() {
-            if let Some((later, _)) = self.losers.get(i + AHEAD) {
-                cells.prefetch(*later as usize);
-            }
-            if cells.is_empty(*cell as usize) {
-                cells.touched.mark_px(loser.record.px());
-                put(cells, *cell as usize, &loser.moving());
-            }
+/// Who lost its cell to a sample of the same surface goes to the one beside it, if that is empty.
+fn step_aside(store: &mut Store, losers: &[Loser]) {
+    let layout = store.layout;
+    let cells = &mut Cells::of(store);
+    for (i, (cell, loser)) in losers.iter().enumerate() {
+        if let Some((later, _)) = losers.get(i + AHEAD) {
+            cells.prefetch(*later as usize);
         }
-        self.losers.clear();
+        if cells.is_empty(*cell as usize) {
+            let (x, y) = layout.pixel_of(*cell as usize);
+            let [px, py] = loser.px;
+            let mut record = loser.record;
+            record.set_offset([px - x as f32 - 0.5, py - y as f32 - 0.5]);
+            cells.touched.mark(x, y);
+            put(cells, *cell as usize, &Moving { record: &record, ..loser.moving() });
+        }
     }
 }
 
@@ -223,7 +241,7 @@ impl Losing<'_> {
     /// Nobody goes where somebody is already.
     #[inline(always)]
     fn push(&mut self, cells: &Cells<'_>, loser: &Mover) {
-        let Some(cell) = beside(self.layout, loser.record.px()) else { return };
+        let Some(cell) = beside(self.layout, loser.px) else { return };
         let is_lifted = self.lifted.contains(&(self.layout.in_plane(cell) as u32));
         if !is_lifted || cells.is_empty(cell - self.first) {
             self.losers.push((cell as u32, *loser));
@@ -246,7 +264,7 @@ fn beside(layout: &Layout, [x, y]: [f32; 2]) -> Option<usize> {
 /// One sample to its new cell, if it stays there.
 #[inline(always)]
 fn put_down(cells: &mut Cells<'_>, cell: usize, mover: &Moving<'_>, losing: &mut Losing<'_>) {
-    cells.touched.mark_px(mover.record.px());
+    cells.touched.mark_px(mover.px);
     if cells.is_empty(cell) {
         return put(cells, cell, mover);
     }
@@ -259,21 +277,24 @@ fn put_down(cells: &mut Cells<'_>, cell: usize, mover: &Moving<'_>, losing: &mut
         return;
     }
     if mover.record.tick().is_later_than(cells.record[cell].tick()) {
-        losing.push(cells, &at(cells, cell));
+        losing.push(cells, &at(cells, cell, mover.px));
         put(cells, cell, mover);
     } else {
         losing.push(cells, &mover.mover());
     }
 }
 
-/// The sample in a cell.
+/// The sample in a cell of the pixel at a position in the picture.
 #[inline(always)]
-fn at(cells: &Cells<'_>, cell: usize) -> Mover {
+fn at(cells: &Cells<'_>, cell: usize, pixel_px: [f32; 2]) -> Mover {
+    let (record, offset) = (cells.record[cell], cells.record[cell].offset());
     Mover {
-        record: cells.record[cell],
-        surfel: cells.surfel[cell],
-        lit: cells.lit[cell],
+        px: [0, 1].map(|k| pixel_px[k] as i32 as f32 + 0.5 + offset[k]),
         object: cells.object[cell],
+        primitive: cells.primitive(cell),
+        record,
+        surfel: cells.surfel[cell],
+        shading: cells.shading(cell),
     }
 }
 
@@ -283,12 +304,18 @@ fn put(cells: &mut Cells<'_>, cell: usize, mover: &Moving<'_>) {
     cells.record[cell] = *mover.record;
     cells.surfel[cell] = *mover.surfel;
     cells.object[cell] = mover.object;
-    cells.lit[cell] = *mover.lit;
+    if let Some(shading) = cells.shading.get_mut(cell) {
+        *shading = *mover.shading;
+    }
+    if let Some(primitive) = cells.primitive.get_mut(cell) {
+        *primitive = mover.primitive;
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reconstruction::reproject::store::Sample;
     use crate::{Projection, Size};
 
     /// Takes x of object 0 to column `scale` · x + `shift`.
@@ -302,46 +329,43 @@ mod tests {
         Pose { picture_from_object: vec![projection], ..Pose::default() }
     }
 
-    fn sample_at(x: f32, tick: u32) -> (Record, Surfel) {
-        let record = Record([x, 0.5, 0.0, f32::from_bits(tick), 0.0, 0.0, 0.0, 0.0]);
-        (record, Surfel([x, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    fn sample_at(x: f32, tick: u32) -> Sample {
+        let surfel = Surfel::new([x, 0.5, 0.0], [0.0; 3]);
+        Sample { surfel, ..Sample::at([x, 0.5], 0.0, tick) }
     }
 
     /// Samples of object 0 at positions x of a row of eight pixels, each newer than the one before, where a pose that makes everything
     /// half as wide takes them.
     fn halved(positions: &[f32]) -> Vec<Option<(u32, f32)>> {
-        let mut store = Store::new(Size::new(8, 1), 1);
-        for (tick, &x) in (1..).zip(positions) {
-            let cell = store.layout.of_px([x, 0.5]).expect("inside");
-            store.object[cell] = 0;
-            (store.record[cell], store.surfel[cell]) = sample_at(x, tick);
-        }
+        let mut store = Store::new(Size::new(8, 1), 1, false);
+        (1..).zip(positions).for_each(|(tick, &x)| store.insert(&sample_at(x, tick), false));
         Warp::default().run(&mut store, &pose(0.5, 0.0), 1, |_| false);
         let cell = |x| store.layout.of_pixel(x, 0);
-        let sample = |x| (store.tick(cell(x)).0, store.record[cell(x)].px()[0]);
+        let px = |x: i32| x as f32 + 0.5 + store.record[cell(x)].offset()[0];
+        let sample = |x| (store.tick(cell(x)).0, px(x));
         (0..8).map(|x| (!store.is_empty(cell(x))).then(|| sample(x))).collect()
     }
 
     #[test]
     fn who_is_displaced_comes_back_where_its_surface_is() {
-        let mut store = Store::new(Size::new(8, 1), 1);
+        let mut store = Store::new(Size::new(8, 1), 1, true);
         let cell = |store: &Store, x: f32| store.layout.of_px([x, 0.5]).expect("inside");
         let (old, gone) = (cell(&store, 1.5), cell(&store, 7.5));
         for (i, x) in [(old, 1.5), (gone, 7.5)] {
-            store.object[i] = 0;
-            (store.record[i], store.surfel[i]) = sample_at(x, 1);
-            store.lit[i].lit = 7;
+            store.insert(&sample_at(x, 1), false);
+            store.shading[i].0[5] = f32::from_bits(7);
         }
         let mut warp = Warp::default();
-        for i in [old, gone] {
-            warp.displace(&mut store, i);
+        for (i, x) in [(old, 1.2), (gone, 7.8)] {
+            warp.displace(&mut store, i, [x, 0.9]);
             // Something at rest has been traced there.
             store.object[i] = SCREEN;
         }
         // Three to the right: one of the two leaves the picture.
         warp.run(&mut store, &pose(1.0, 3.0), 1, |object| object == SCREEN);
         let now = cell(&store, 4.5);
-        assert_eq!((store.object[now], store.record[now].px()[0], store.lit[now].lit), (0, 4.5, 7));
+        assert_eq!((store.object[now], store.record[now].offset()[0]), (0, 0.0));
+        assert_eq!(store.shading[now].lit(), 7);
         assert_eq!((store.object[old], store.object[gone]), (SCREEN, SCREEN));
     }
 
@@ -384,16 +408,13 @@ mod tests {
         projection: [[f64; 4]; 4],
         expected: impl Fn([f64; 3]) -> [f64; 2],
     ) -> f64 {
-        let mut store = Store::new(SIZE, 1);
+        let mut store = Store::new(SIZE, 1, false);
         let mut wanted = Vec::new();
         for (x, y) in (0..48).step_by(2).flat_map(|y| (0..64).step_by(2).map(move |x| (x, y))) {
             let Some(point) = hit(x, y, on_sphere) else { continue };
             let cell = store.layout.of_pixel(x as i32, y as i32);
-            let mut surfel = Surfel::default();
-            (0..3).for_each(|k| surfel.0[k] = point[k] as f32);
-            (store.object[cell], store.surfel[cell]) = (0, surfel);
-            let tick = f32::from_bits(wanted.len() as u32);
-            store.record[cell] = Record([0.0, 0.0, 0.0, tick, 0.0, 0.0, 0.0, 0.0]);
+            let surfel = Surfel::new(point.map(|p| p as f32), [0.0; 3]);
+            store.set(cell, &Sample { surfel, ..Sample::at([0.0; 2], 0.0, wanted.len() as u32) });
             wanted.push(expected(point));
         }
         let projection = Projection(projection.map(|row| row.map(|number| number as f32)));
@@ -401,7 +422,9 @@ mod tests {
         Warp::default().run(&mut store, &pose, 1, |_| false);
         let mut found = 0.0;
         for cell in (0..store.layout.len()).filter(|&cell| !store.is_empty(cell)) {
-            let (px, wanted) = (store.record[cell].px(), wanted[store.tick(cell).0 as usize]);
+            let ((x, y), offset) = (store.layout.pixel_of(cell), store.record[cell].offset());
+            let px = [x as f32 + 0.5 + offset[0], y as f32 + 0.5 + offset[1]];
+            let wanted = wanted[store.tick(cell).0 as usize];
             let off = (0..2).map(|k| (f64::from(px[k]) - wanted[k]).abs()).fold(0.0, f64::max);
             assert!(off < 1e-3, "at {px:?} instead of {wanted:?}");
             found += 1.0;

@@ -84,7 +84,7 @@ mod tests {
         let mut late = Late::new();
         for refresh in 0..3 {
             let now = Time(refresh * 16 * MILLISECOND);
-            canvas.update(now, &mut Vec::new(), &mut canvas.traced().tiles().to_vec());
+            canvas.update(now, canvas.traced().tiles().to_vec(), Vec::new());
             late.look(&canvas);
         }
         canvas.set_last_minute(&mut (0..pixels).collect());

@@ -450,9 +450,8 @@ mod tests {
     fn pixels_that_wait_twice_take_no_more_than_the_batch() {
         let size = Size::new(64, 32);
         let mut canvas = Canvas::new(size);
-        let mut holes: Vec<u32> = (0..2048).chain(0..1024).collect();
-        let mut marks = canvas.traced().tiles().to_vec();
-        canvas.update(Time(1), &mut holes, &mut marks);
+        let holes: Vec<u32> = (0..2048).chain(0..1024).collect();
+        canvas.update(Time(1), canvas.traced().tiles().to_vec(), holes);
         for count in [1, 100, 2000] {
             let chosen = choose(&mut Adaptive::new(DEFAULT_TEMPORAL, 1), &canvas, count).len();
             assert!(chosen.abs_diff(count) <= 1, "{chosen} of {count}");
@@ -598,7 +597,7 @@ mod tests {
             for millis in 0..48u64 {
                 let now = Time(millis * 1_000_000);
                 if millis % 16 == 0 {
-                    canvas.update(now, &mut Vec::new(), &mut canvas.traced().tiles().to_vec());
+                    canvas.update(now, canvas.traced().tiles().to_vec(), Vec::new());
                     canvas.set_last_minute(&mut (0..200).collect());
                 }
                 sampler.choose(now, &canvas, 100, &mut requests);

@@ -50,7 +50,7 @@ pub(crate) struct Refine {
     /// By u m σ^(1+b), with u as the even part.
     shares: Shares,
     order: Order,
-    /// Per pixel the number of its last sample.
+    /// Per pixel the number of its last sample; empty until samples are wanted.
     index: Vec<u32>,
     /// √E_s.
     spatial_error: f32,
@@ -180,7 +180,7 @@ impl Refine {
             variance_sum: f64::from(FIRST_VARIANCE) * tiles as f64,
             shares: Shares::new(tiles, rng),
             order: Order::new(tiles, rng),
-            index: vec![0; grid.size.pixels()],
+            index: Vec::new(),
             spatial_error: 0.0,
             temporal_error: 0.0,
             drawn: Vec::new(),
@@ -194,6 +194,7 @@ impl Refine {
         if canvas.samples_wanted() == 0 {
             return;
         }
+        self.index.resize(canvas.size().pixels(), 0);
         // Who has begun anew begins the sequence anew.
         for (index, n) in self.index.iter_mut().zip(canvas.samples()) {
             *index = if *n > 1 { *index } else { 0 };

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::{GONE_PX, Losing, Moved, Moving, NOWHERE, put_down};
 use crate::pose::BEHIND;
 use crate::reconstruction::reproject::cells::Cells;
-use crate::reconstruction::reproject::store::{EMPTY, Layout, Lit, Record, Surfel, rows_of};
+use crate::reconstruction::reproject::store::{self, EMPTY, Layout, Record, Shading, Surfel};
 use crate::wide::{self, F8, M8, Unit};
 use crate::{Pose, Surface, Window};
 
@@ -39,6 +39,8 @@ pub(super) struct Lifted([Row; ROWS_AHEAD]);
 #[derive(Default)]
 struct Row {
     eights: Vec<Eight>,
+    /// Of these, in the same order; empty if the store has no such.
+    rests: Vec<Rest>,
     len: usize,
 }
 
@@ -49,18 +51,34 @@ struct Eight {
     lanes: u32,
     /// Where it is now; [`NOWHERE`] outside the picture.
     cell: [u32; 8],
+    px: [[f32; 8]; 2],
+    object: [u32; 8],
     /// With the position and the depth that it has now.
     record: [Record; 8],
     surfel: [Surfel; 8],
-    lit: [Lit; 8],
-    object: [u32; 8],
 }
+
+/// What few pictures need of them, see [`store::Store`].
+#[derive(Clone, Default)]
+struct Rest {
+    shading: [Shading; 8],
+    primitive: [u32; 8],
+}
+
+/// Of a sample without.
+const PLAIN: Rest = Rest { shading: [Shading([0.0; 6]); 8], primitive: [0; 8] };
 
 impl Eight {
     #[inline(always)]
-    fn moving(&self, lane: usize) -> Moving<'_> {
-        let (record, surfel, lit) = (&self.record[lane], &self.surfel[lane], &self.lit[lane]);
-        Moving { record, surfel, lit, object: self.object[lane] }
+    fn moving<'a>(&'a self, rest: &'a Rest, lane: usize) -> Moving<'a> {
+        Moving {
+            px: [self.px[0][lane], self.px[1][lane]],
+            object: self.object[lane],
+            primitive: rest.primitive[lane],
+            record: &self.record[lane],
+            surfel: &self.surfel[lane],
+            shading: &rest.shading[lane],
+        }
     }
 }
 
@@ -72,6 +90,22 @@ impl Row {
         }
         self.len += 1;
         &mut self.eights[self.len - 1]
+    }
+
+    /// The rest of the last eight, which are those from `start` on.
+    #[inline(always)]
+    fn keep_rest(&mut self, cells: &Cells<'_>, start: usize) {
+        if cells.shading.is_empty() && cells.primitive.is_empty() {
+            return;
+        }
+        self.rests.resize(self.rests.len().max(self.len), PLAIN);
+        let rest = &mut self.rests[self.len - 1];
+        if let Some(shading) = cells.shading.get(start..start + 8) {
+            rest.shading.copy_from_slice(shading);
+        }
+        if let Some(primitive) = cells.primitive.get(start..start + 8) {
+            rest.primitive.copy_from_slice(primitive);
+        }
     }
 }
 
@@ -135,7 +169,9 @@ impl<F: Fn(u32) -> bool> Carry<'_, F> {
         }
         if moving.any() {
             let to = cells_at(&self.layout, there.px);
-            lift(cells, start, moving, &there, to, self.lifted.0[turn].next());
+            let row = &mut self.lifted.0[turn];
+            lift(cells, start, moving, &there, to, row.next());
+            row.keep_rest(cells, start);
         }
         moving.any()
     }
@@ -149,12 +185,13 @@ impl<F: Fn(u32) -> bool> Carry<'_, F> {
         let (layout, first) = (&self.layout, *first);
         let mut losing = Losing { layout, lifted: &here, first, losers };
         let row = &self.lifted.0[turn];
-        for eight in &row.eights[..row.len] {
+        for (nth, eight) in row.eights[..row.len].iter().enumerate() {
+            let rest = row.rests.get(nth).unwrap_or(&PLAIN);
             let mut lanes = eight.lanes;
             while lanes != 0 {
                 let lane = lanes.trailing_zeros() as usize;
                 lanes &= lanes - 1;
-                let (cell, moving) = (eight.cell[lane], eight.moving(lane));
+                let (cell, moving) = (eight.cell[lane], eight.moving(rest, lane));
                 if here.contains(&(layout.in_plane(cell as usize) as u32)) {
                     put_down(cells, cell as usize - first, &moving, &mut losing);
                 } else if cell != NOWHERE {
@@ -180,14 +217,13 @@ fn lift<U: Unit>(
     eight.lanes = moving.bits();
     eight.cell = to.lanes();
     eight.object = object.lanes();
-    let (records, _) = cells.record[start..start + 8].as_chunks::<8>();
-    let [column, row] = there.px;
-    let moved = F8::with_first([column, row, there.depth], rows_of(&records[0]));
-    for (record, moved) in eight.record.iter_mut().zip(moved) {
-        *record = Record(moved);
+    eight.px = [there.px[0].lanes(), there.px[1].lanes()];
+    let [depth, offset] = store::words(there.px, there.depth).map(M8::lanes);
+    let records = eight.record.iter_mut().zip(&cells.record[start..start + 8]);
+    for (lane, (record, before)) in records.enumerate() {
+        *record = before.moved(depth[lane], offset[lane]);
     }
     eight.surfel.copy_from_slice(&cells.surfel[start..start + 8]);
-    eight.lit.copy_from_slice(&cells.lit[start..start + 8]);
 }
 
 /// The eight samples from `start` on, as if all were of the same object.
@@ -204,7 +240,7 @@ fn carry_eight<U: Unit>(cells: &Cells<'_>, pose: &Pose, object: u32, start: usiz
     let Some(projection) = projection else { return There { px: [gone; 2], depth: gone } };
     let (surfels, _) = cells.surfel[start..start + 8].as_chunks::<8>();
     let [a, b, c, d, e, f, g, h] = &surfels[0];
-    let [x, y, z, _] = F8::first_columns([&a.0, &b.0, &c.0, &d.0, &e.0, &f.0, &g.0, &h.0]);
+    let [x, y, z, _] = F8::four_columns([&a.0, &b.0, &c.0, &d.0, &e.0, &f.0, &g.0, &h.0]);
     let row = |k: usize| {
         let [a, b, c, d] = projection.0[k];
         F8::splat(a) * x + F8::splat(b) * y + (F8::splat(c) * z + F8::splat(d))
