@@ -29,9 +29,6 @@ pub(crate) enum Chance {
 
 /// Whether rays may pass a mesh's triangles.
 pub(crate) fn may_have_holes(scene: &Scene, mesh: &Mesh) -> bool {
-    let mut materials = mesh.triangle_materials.clone();
-    materials.sort_unstable();
-    materials.dedup();
     let lets_pass = |material: &Material| {
         let is_whole = material.base_color.w >= 1.0
             && material.base_color_texture.is_none()
@@ -44,7 +41,8 @@ pub(crate) fn may_have_holes(scene: &Scene, mesh: &Mesh) -> bool {
                 AlphaMode::Mask { cutoff } => !is_whole || cutoff > 1.0,
             }
     };
-    materials.iter().any(|&m| scene.materials.get(m as usize).is_some_and(lets_pass))
+    let lets_pass: Vec<bool> = scene.materials.iter().map(lets_pass).collect();
+    mesh.triangle_materials.iter().any(|&m| lets_pass.get(m as usize) == Some(&true))
 }
 
 impl World {

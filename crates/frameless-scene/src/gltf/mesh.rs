@@ -178,7 +178,7 @@ impl Joiner<'_> {
             document.budget.add_vertices(pointer, 3 * triangles.len())?;
             document.budget.allocate(pointer, 3 * triangles.len(), BYTES_PER_VERTEX)?;
             let appended = self.append_vertices(flatten(&shared, &mut triangles));
-            return self.append_triangles(primitive, &triangles, &appended, document);
+            return self.append_triangles(primitive, triangles, &appended, document);
         }
         if !self.shared.contains_key(&primitive.attributes) {
             let mut vertices = self.read_vertices(&primitive.attributes, document)?;
@@ -187,7 +187,7 @@ impl Joiner<'_> {
             self.shared.insert(primitive.attributes.clone(), appended);
         }
         let appended = self.shared[&primitive.attributes].clone();
-        self.append_triangles(primitive, &triangles, &appended, document)
+        self.append_triangles(primitive, triangles, &appended, document)
     }
 
     fn read_vertices(
@@ -215,7 +215,7 @@ impl Joiner<'_> {
     fn append_vertices(&mut self, vertices: Vertices) -> Shared {
         let mesh = &mut self.mesh;
         let first = mesh.positions.len();
-        mesh.positions.extend(vertices.positions);
+        append(&mut mesh.positions, vertices.positions);
         let all = mesh.positions.len();
         extend(&mut mesh.normals, vertices.normals, Vec3::Y, first, all);
         for (uvs, more) in mesh.uvs.iter_mut().zip(vertices.uvs) {
@@ -236,19 +236,17 @@ impl Joiner<'_> {
     fn append_triangles(
         &mut self,
         primitive: &Primitive<'_>,
-        triangles: &[[u32; 3]],
+        mut triangles: Vec<[u32; 3]>,
         vertices: &Shared,
         document: &mut Document<'_>,
     ) -> Result<(), Fault> {
-        let is_somewhere = |corner: &u32| vertices.nowhere.binary_search(corner).is_err();
-        let drawn: Vec<[u32; 3]> = triangles
-            .iter()
-            .filter(|triangle| vertices.nowhere.is_empty() || triangle.iter().all(is_somewhere))
-            .copied()
-            .collect();
-        self.append_tangents(primitive, &drawn, vertices, document)?;
-        let drawn = drawn.iter().map(|triangle| triangle.map(|corner| corner + vertices.first));
-        self.mesh.triangles.extend(drawn);
+        if !vertices.nowhere.is_empty() {
+            let is_somewhere = |corner: &u32| vertices.nowhere.binary_search(corner).is_err();
+            triangles.retain(|triangle| triangle.iter().all(is_somewhere));
+        }
+        self.append_tangents(primitive, &triangles, vertices, document)?;
+        triangles.as_flattened_mut().iter_mut().for_each(|corner| *corner += vertices.first);
+        append(&mut self.mesh.triangles, triangles);
         let count = self.mesh.triangles.len();
         self.mesh.triangle_materials.resize(count, primitive.material_slot);
         Ok(())
@@ -291,6 +289,15 @@ impl Joiner<'_> {
 /// Position, normal, texture coordinates, colour.
 const BYTES_PER_VERTEX: usize = 12 + 12 + UV_SETS * 8 + 16;
 
+/// Appends `more` to `values`. The first of them stay where they are: of a large mesh there may be no room for both.
+fn append<T>(values: &mut Vec<T>, more: Vec<T>) {
+    if values.is_empty() {
+        *values = more;
+    } else {
+        values.extend(more);
+    }
+}
+
 /// Appends `more` to `values` so that it is `all` long, unless it stays empty; vertices without a value get `filler`.
 pub(super) fn extend<T: Copy>(
     values: &mut Vec<T>,
@@ -302,7 +309,7 @@ pub(super) fn extend<T: Copy>(
     match more {
         Some(more) => {
             values.resize(first, filler);
-            values.extend(more);
+            append(values, more);
         }
         None if values.is_empty() => {}
         None => values.resize(all, filler),
