@@ -114,7 +114,9 @@ impl Waiting {
             *next += 1;
         }
         ordered.copy_from_slice(by_class);
+        self.classes = Vec::new();
         self.by_rank(Hole::OffCentre, grid.size.width, ordered);
+        give_back(ordered);
         self.clear();
     }
 
