@@ -11,11 +11,13 @@ use glam::{Affine3A, Quat, Vec3, Vec3A};
 
 use crate::World;
 use crate::kernel::Isa;
+use crate::leaf::Leaf;
 use crate::ray::Hit;
 use crate::reference::{as_mesh, every_triangle, random_rays, random_soup, ray};
 use crate::refit::Flexible;
 use crate::test_scenes as scenes;
 use crate::traverse::Stack;
+use crate::wide::Node;
 
 /// Seconds until the joint has turned by half a turn; it stays so.
 const BENDS_SECS: f32 = 1.0;
@@ -162,14 +164,17 @@ fn vertices_that_are_nowhere_take_only_their_triangles_away() {
     let kept: Vec<u32> = (0..300).filter(sane).collect();
     assert_eq!(kept.len(), 300 - 6);
     let drawn: Vec<u32> = {
-        let flat =
-            |k: usize, lane: usize| tree.blas.packs[k].vertex.map(|c| c.map(|axis| axis[lane]));
-        let packs = 0..tree.blas.packs.len();
-        let lanes = packs.flat_map(|k| (0..4).map(move |lane| (k, lane)));
-        let has_area = |[a, b, c]: [[f32; 3]; 3]| a != b || b != c;
-        let mut drawn: Vec<u32> = lanes
-            .filter(|&(k, lane)| has_area(flat(k, lane)))
-            .map(|(k, lane)| tree.blas.packs[k].primitive[lane])
+        let children = tree.blas.nodes.iter().flat_map(|node| node.child);
+        let leaves = children
+            .filter(|&child| child != Node::UNUSED && child.is_leaf())
+            .map(|child| Leaf::at(&tree.blas.leaves, child.place()));
+        let is_drawn = |leaf: &Leaf<'_>, lane: usize| {
+            (0..3).all(|k| leaf.corner(lane, k).iter().all(|x| x.is_finite()))
+        };
+        let mut drawn: Vec<u32> = leaves
+            .flat_map(|leaf| (0..leaf.triangles()).map(move |lane| (leaf, lane)))
+            .filter(|(leaf, lane)| is_drawn(leaf, *lane))
+            .map(|(leaf, lane)| leaf.triangle(lane))
             .collect();
         drawn.sort_unstable();
         drawn.dedup();
@@ -213,11 +218,11 @@ fn a_tree_that_has_become_bad_is_built_anew() {
     let mesh = random_soup(&mut rng, 1_000, 0.2);
     let at_rest: Vec<Vec3A> = mesh.positions.iter().map(|&p| p.into()).collect();
     let mut tree = Flexible::new(&mesh, &at_rest);
-    let built = tree.blas.packs.as_ptr();
+    let built = tree.blas.leaves.as_ptr();
     // A little to the side: the same memory, the same shape.
     let moved: Vec<Vec3A> = at_rest.iter().map(|p| 1.1 * *p + Vec3A::X).collect();
     tree.update(&mesh, &moved);
-    assert_eq!(tree.blas.packs.as_ptr(), built, "memory was allocated");
+    assert_eq!(tree.blas.leaves.as_ptr(), built, "memory was allocated");
     // Every triangle to the place of another.
     let mut order: Vec<usize> = (0..1_000).collect();
     for k in (1..1_000).rev() {

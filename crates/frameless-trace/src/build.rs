@@ -1,80 +1,69 @@
-//! From triangles to a wide BVH.
+//! From triangles to a wide BVH: of few at once, of many in parts (see [`crate::parts`]).
 
 use frameless_scene::Mesh;
 use glam::{Affine3A, Vec3, Vec3A};
-use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::leaf_collapser;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::ploc::PlocBuilder;
 
-use crate::kernel::Pack;
+use crate::collapse::{Collapse, bounds};
+use crate::leaf::{self, Corner, LONGEST, MOST_TRIANGLES, MOST_VERTICES};
 use crate::pages::prefer_large_pages;
-use crate::parts::{Of, PART, build_in_parts};
-use crate::traverse::STACK_PER_TREE;
-use crate::untied::Ploc;
-use crate::wide::{Child, Node, collapse};
+use crate::parts;
+use crate::sah;
+use crate::wide::{Bounds, Child, Node};
 
-/// A mesh's bottom-level BVH: triangles copied into packs of four, in the order of the leaves.
+/// A mesh's bottom-level BVH with its triangles.
 #[derive(Clone, Debug)]
 pub(crate) struct Blas {
+    /// The first is the root; parents come before their children.
     pub(crate) nodes: Vec<Node>,
-    pub(crate) packs: Vec<Pack>,
+    /// See [`crate::leaf`]; as many words follow the last leaf as may be read of one.
+    pub(crate) leaves: Vec<u32>,
     /// Of all triangles that can be hit; `None` if there are none.
     pub(crate) bounds: Option<(Vec3A, Vec3A)>,
 }
 
+/// What a tree is built over.
+pub(crate) trait Triangles: Sync {
+    /// How many there are.
+    fn count(&self) -> u32;
+
+    fn corners(&self, triangle: u32) -> [Corner; 3];
+}
+
+/// A mesh where it stands.
+pub(crate) struct OneMesh<'a> {
+    pub(crate) mesh: &'a Mesh,
+    pub(crate) place: &'a Affine3A,
+}
+
+impl Triangles for OneMesh<'_> {
+    fn count(&self) -> u32 {
+        self.mesh.triangles.len() as u32
+    }
+
+    fn corners(&self, triangle: u32) -> [Corner; 3] {
+        corners_at(self.place, self.mesh, triangle)
+    }
+}
+
 impl Blas {
-    /// The mesh's triangles at a place. Those with a vertex that is not finite, or so far away that squares overflow, are left out: the builder
-    /// panics on NaN. Triangles without area stay; no ray hits them.
-    pub(crate) fn new(mesh: &Mesh, place: &Affine3A) -> Blas {
-        let corners = |primitive| corners_at(place, mesh, primitive);
-        let (primitives, boxes): (Vec<u32>, Vec<Aabb>) = (0..mesh.triangles.len() as u32)
-            .filter_map(|primitive| Some((primitive, sane_box(&corners(primitive))?)))
-            .unzip();
-        Blas::over(&primitives, boxes, corners)
-    }
-
-    /// Of these triangles, whose boxes are known; `corners` tells where each is.
-    pub(crate) fn over(
-        primitives: &[u32],
-        boxes: Vec<Aabb>,
-        corners: impl Fn(u32) -> [Vec3; 3],
-    ) -> Blas {
-        let mut blas = Blas { nodes: Vec::new(), packs: Vec::new(), bounds: union(&boxes) };
-        let mut binary = binary_by_clustering(&boxes);
-        // Not held beside the packs: they are the largest things in memory.
-        drop(boxes);
-        if blas.take(&binary, primitives, &corners) > STACK_PER_TREE {
-            let around = |&primitive| Aabb::from_points(&corners(primitive).map(Vec3A::from));
-            let boxes: Vec<Aabb> = primitives.iter().map(around).collect();
-            binary = binary_by_median(&boxes);
-            blas.take(&binary, primitives, &corners);
+    /// Of those triangles that can be hit: none with a vertex that is not finite, or so far away that squares overflow. The builder panics
+    /// on NaN. Triangles without area stay; no ray hits them.
+    pub(crate) fn new(triangles: &impl Triangles) -> Blas {
+        let Tree { mut nodes, mut leaves, roots } = parts::build(triangles);
+        if nodes.is_empty() {
+            nodes.push(Node::EMPTY);
         }
-        blas.prefer_large_pages();
-        blas
-    }
-
-    fn prefer_large_pages(&self) {
-        prefer_large_pages(&self.nodes);
-        prefer_large_pages(&self.packs);
-    }
-
-    fn take(
-        &mut self,
-        binary: &Bvh2,
-        primitives: &[u32],
-        corners: &impl Fn(u32) -> [Vec3; 3],
-    ) -> usize {
-        self.packs.clear();
-        let packs = &mut self.packs;
-        collapse(binary, &mut self.nodes, |members| {
-            let first = packs.len();
-            packs.extend(members.chunks(4).map(|four| pack(primitives, four, corners)));
-            Child::leaf(first, packs.len() - first)
-        })
+        leaves.extend([0; LONGEST]);
+        nodes.shrink_to_fit();
+        leaves.shrink_to_fit();
+        prefer_large_pages(&nodes);
+        prefer_large_pages(&leaves);
+        let bounds = roots.first().map(|root| root.bounds.into());
+        Blas { nodes, leaves, bounds }
     }
 }
 
@@ -83,95 +72,123 @@ pub(crate) fn corners(mesh: &Mesh, primitive: u32) -> [Vec3; 3] {
     mesh.triangles[primitive as usize].map(|vertex| mesh.positions[vertex as usize])
 }
 
-/// The same where the mesh stands.
-pub(crate) fn corners_at(place: &Affine3A, mesh: &Mesh, primitive: u32) -> [Vec3; 3] {
-    corners(mesh, primitive).map(|corner| place.transform_point3(corner))
+/// Where the mesh stands; what is at one place is one vertex.
+pub(crate) fn corners_at(place: &Affine3A, mesh: &Mesh, primitive: u32) -> [Corner; 3] {
+    corners(mesh, primitive).map(|corner| {
+        let at = place.transform_point3(corner);
+        Corner { at, name: at.to_array().map(f32::to_bits) }
+    })
 }
 
 /// Products of two coordinates, and of three in the builder's areas, must stay below 3.4e38.
 pub(crate) const FARTHEST: f32 = 1e15;
 
-pub(crate) fn sane_box(corners: &[Vec3; 3]) -> Option<Aabb> {
-    let sane = corners.iter().all(|c| c.is_finite() && c.abs().max_element() < FARTHEST);
-    sane.then(|| Aabb::from_points(&corners.map(Vec3A::from)))
+/// The box around a triangle; `None` if no tree may hold it.
+pub(crate) fn sane_box(corners: &[Corner; 3]) -> Option<[Vec3; 2]> {
+    let is_sane = |c: &Corner| c.at.is_finite() && c.at.abs().max_element() < FARTHEST;
+    let [a, b, c] = corners.map(|corner| corner.at);
+    corners.iter().all(is_sane).then(|| [a.min(b).min(c), a.max(b).max(c)])
 }
 
-fn union(boxes: &[Aabb]) -> Option<(Vec3A, Vec3A)> {
-    boxes.iter().map(|b| (b.min, b.max)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+/// Of a tree, and of trees that are to be joined.
+#[derive(Default)]
+pub(crate) struct Tree {
+    /// Of one tree the first is the root.
+    pub(crate) nodes: Vec<Node>,
+    pub(crate) leaves: Vec<u32>,
+    pub(crate) roots: Vec<Root>,
 }
 
-fn pack(primitives: &[u32], members: &[u32], corners: &impl Fn(u32) -> [Vec3; 3]) -> Pack {
-    let mut pack = Pack { vertex: [[[0.0; 4]; 3]; 3], primitive: [0; 4] };
-    for lane in 0..4 {
-        let primitive = primitives[members[lane.min(members.len() - 1)] as usize];
-        pack.primitive[lane] = primitive;
-        for (corner, position) in corners(primitive).iter().enumerate() {
-            for axis in 0..3 {
-                pack.vertex[corner][axis][lane] = position[axis];
+/// Where a tree begins.
+#[derive(Clone, Copy)]
+pub(crate) struct Root {
+    pub(crate) bounds: Bounds,
+    pub(crate) child: Child,
+    /// Entries that a traversal's stack needs.
+    pub(crate) stack_need: usize,
+}
+
+/// Of a part's nodes those that are placed again.
+const REINSERTED: f32 = 0.3;
+
+/// What it costs to test a leaf's triangles, in units of what a node's boxes cost.
+const LEAF_COST: f32 = 1.0;
+
+/// Builds trees over these triangles: one, whose root is a node, or as many as are left when the largest nodes are taken away until there are
+/// `roots`.
+pub(crate) fn build(
+    triangles: &impl Triangles,
+    members: &[u32],
+    roots: usize,
+    most_stack: usize,
+) -> Tree {
+    let corners = |member: u32| triangles.corners(members[member as usize]);
+    let around =
+        |triangle: [Corner; 3]| Aabb::from_points(&triangle.map(|corner| Vec3A::from(corner.at)));
+    let boxes: Vec<Aabb> = (0..members.len() as u32).map(|m| around(corners(m))).collect();
+    let make = |binary: &Bvh2| {
+        let (mut tree, mut collapse) = (Tree::default(), Collapse::default());
+        let Tree { nodes, leaves, .. } = &mut tree;
+        collapse.plan(binary, LEAF_COST, |boxes| fits(corners, boxes));
+        let mut make_leaf = |boxes: &[u32]| {
+            let mut leaf = [(0, corners(boxes[0])); MOST_TRIANGLES];
+            for (lane, &member) in leaf.iter_mut().zip(boxes) {
+                *lane = (members[member as usize], corners(member));
             }
-        }
-    }
-    pack
-}
-
-/// Two packs.
-const MOST_PER_LEAF: u32 = 8;
-
-/// By clustering, of many boxes part by part.
-fn binary_by_clustering(boxes: &[Aabb]) -> Bvh2 {
-    if boxes.len() <= PART {
-        return cluster(boxes, MOST_PER_LEAF);
-    }
-    build_in_parts(boxes, |boxes, of| match of {
-        Of::Boxes => cluster(boxes, MOST_PER_LEAF),
-        Of::Parts => cluster(boxes, 1),
-    })
-}
-
-/// Parallel locally-ordered clustering with reinsertion; `obvhs`' medium preset, step by step, since its helper
-/// validates the whole tree in debug builds.
-pub(crate) fn cluster(boxes: &[Aabb], most_per_leaf: u32) -> Bvh2 {
-    if boxes.len() as u32 <= most_per_leaf.min(4) {
-        return one_leaf(boxes);
-    }
-    let preset = BvhBuildParams::medium_build();
-    let ploc = Ploc {
-        search_distance: preset.ploc_search_distance,
-        sort_precision: preset.sort_precision,
-        search_depth_threshold: preset.search_depth_threshold,
+            Child::leaf(leaf::write(leaves, &leaf[..boxes.len()]))
+        };
+        tree.roots = if roots == 1 {
+            let stack_need = collapse.make_root(binary, nodes, make_leaf);
+            vec![Root { bounds: bounds(binary, 0), child: Child::ROOT, stack_need }]
+        } else {
+            let roots = collapse.cut(binary, roots).into_iter().map(|root| {
+                let (child, stack_need) = collapse.make(binary, root, nodes, &mut make_leaf);
+                Root { bounds: bounds(binary, root), child, stack_need }
+            });
+            roots.collect()
+        };
+        tree
     };
-    let mut binary = Bvh2::zeroed(boxes.len());
-    ploc.build(&mut PlocBuilder::with_capacity(boxes.len()), boxes, &mut binary);
-    let mut optimizer = ReinsertionOptimizer::default();
-    let ratio = preset.reinsertion_batch_ratio;
-    optimizer.run(&mut binary, ratio, None);
-    leaf_collapser::collapse(&mut binary, most_per_leaf, preset.collapse_traversal_cost);
-    optimizer.run(
-        &mut binary,
-        ratio * preset.post_collapse_reinsertion_batch_ratio_multiplier,
-        None,
-    );
+    let tree = make(&binary_tree(&boxes, REINSERTED));
+    let is_deep = tree.roots.iter().any(|root| root.stack_need > most_stack);
+    if is_deep { make(&halve(&boxes)) } else { tree }
+}
+
+/// Whether some triangles have few enough vertices for one leaf.
+fn fits(corners: impl Fn(u32) -> [Corner; 3], triangles: &[u32]) -> bool {
+    let mut names = [[[0; 3]; 3]; MOST_TRIANGLES];
+    for (names, &triangle) in names.iter_mut().zip(triangles) {
+        *names = corners(triangle).map(|corner| corner.name);
+    }
+    leaf::vertices(&names[..triangles.len()]) <= MOST_VERTICES
+}
+
+/// Divided from above; then the largest of the boxes, as many of a hundred, find better places. A box per leaf.
+pub(crate) fn binary_tree(boxes: &[Aabb], reinserted: f32) -> Bvh2 {
+    let mut binary = sah::divide(boxes);
+    ReinsertionOptimizer::default().run(&mut binary, reinserted, None);
     binary
 }
 
 fn one_leaf(boxes: &[Aabb]) -> Bvh2 {
     let mut binary = Bvh2::zeroed(0);
-    if let Some((min, max)) = union(boxes) {
-        binary.nodes.push(Bvh2Node::new(Aabb::new(min, max), boxes.len() as u32, 0));
+    if !boxes.is_empty() {
+        let around = boxes.iter().fold(Aabb::INVALID, |sum, bounds| sum.union(bounds));
+        binary.nodes.push(Bvh2Node::new(around, boxes.len() as u32, 0));
         binary.primitive_indices = (0..boxes.len() as u32).collect();
     }
     binary
 }
 
-/// Halves the primitives by their centres along the longest axis: never deeper than log₂, for inputs on which
-/// clustering grows a tree that is too deep for the traversal's stack.
-pub(crate) fn binary_by_median(boxes: &[Aabb]) -> Bvh2 {
+/// Halves the boxes by their centres along the longest axis: never deeper than log₂, for inputs of
+/// which the usual tree is too deep for the traversal's stack.
+pub(crate) fn halve(boxes: &[Aabb]) -> Bvh2 {
     let mut binary = one_leaf(boxes);
     let Bvh2 { nodes, primitive_indices, .. } = &mut binary;
     let mut work: Vec<usize> = (0..nodes.len()).collect();
     while let Some(at) = work.pop() {
         let (first, count) = (nodes[at].first_index as usize, nodes[at].prim_count as usize);
-        if count <= 4 {
+        if count == 1 {
             continue;
         }
         let members = &mut primitive_indices[first..first + count];
@@ -200,12 +217,15 @@ pub(crate) fn binary_by_median(boxes: &[Aabb]) -> Bvh2 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::traverse::STACK_PER_TREE;
 
     fn stack_need(binary: &Bvh2) -> usize {
-        collapse(binary, &mut Vec::new(), |_| Child::leaf(0, 1))
+        let mut collapse = Collapse::default();
+        collapse.plan(binary, LEAF_COST, |_| true);
+        collapse.make_root(binary, &mut Vec::new(), |_| Child::leaf(0))
     }
 
-    /// Boxes that shrink towards the origin: clustering makes a list of them.
+    /// Boxes that shrink towards the origin: a tree of them is a list.
     fn shrinking(count: i32) -> Vec<Aabb> {
         (0..count)
             .map(|k| 0.8f32.powi(k))
@@ -214,20 +234,19 @@ mod tests {
     }
 
     #[test]
-    fn median_splits_never_need_more_stack_than_there_is() {
+    fn halving_never_needs_more_stack_than_there_is() {
         let boxes = shrinking(390);
-        let clustered = stack_need(&binary_by_clustering(&boxes));
-        let halved = stack_need(&binary_by_median(&boxes));
+        let deep = stack_need(&binary_tree(&boxes, REINSERTED));
+        assert!(deep > STACK_PER_TREE, "{deep}: the fallback would never be taken");
+        let halved = stack_need(&halve(&boxes));
         assert!(halved <= 7 * 9, "{halved} for 390 boxes");
-        // Before boxes were made unlike each other ([`Ploc`]) it was more than there is.
-        assert!(clustered > 100, "{clustered}: nothing that halving would be better for");
     }
 
     #[test]
     fn all_boxes_alike_are_still_halved() {
         let boxes = vec![Aabb::new(Vec3A::ZERO, Vec3A::ONE); 1_000];
-        assert!(stack_need(&binary_by_median(&boxes)) <= 7 * 10);
-        let mut members = binary_by_median(&boxes).primitive_indices;
+        assert!(stack_need(&halve(&boxes)) <= 7 * 10);
+        let mut members = halve(&boxes).primitive_indices;
         members.sort_unstable();
         assert!(members.into_iter().eq(0..1_000));
     }

@@ -1,22 +1,27 @@
-//! The two inner tests: a ray against eight boxes, a ray against four triangles.
+//! The two inner tests: a ray against eight boxes, a ray against a leaf's triangles.
 //!
-//! Written twice, portably and with AVX2 intrinsics, operation for operation the same and without fused multiply-adds, so
-//! that both give the same bits. Everything above them is written once.
+//! Written twice, portably and with AVX2 intrinsics, operation for operation the same and without fused multiply-adds but where products
+//! are exact, so that both give the same bits. Everything above them is written once.
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx2;
 
-use std::ops::Range;
-
 use glam::Vec3A;
 
+use crate::leaf::{Leaf, MOST_TRIANGLES};
 use crate::ray::Ray;
 use crate::traverse::Entry;
 use crate::wide::Node;
 
 /// A box's far side counts as this much farther away, so that rounding never loses a box that the ray touches
-/// (Ize 2013, "Robust BVH Ray Traversal", JCGT 2(2)): entry and exit each carry three roundings, together 6 · 2⁻²⁴ = 3.6e-7.
-pub(crate) const SLAB_MARGIN: f32 = 1.000_000_5;
+/// (Ize 2013, "Robust BVH Ray Traversal", JCGT 2(2)): entry and exit each carry four roundings, together 8 · 2⁻²⁴ = 4.8e-7.
+pub(crate) const SLAB_MARGIN: f32 = 1.000_001;
+/// The same in units of a float's last place, which are between 6e-8 and 1.2e-7 of it: floats that are not negative are in the order of
+/// their bits, and every negative one is before them.
+pub(crate) const SLAB_MARGIN_ULPS: i32 = 16;
+
+/// A ray that is parallel to a pair of sides leaves them no later than this, and its distances are no NaN.
+const LARGEST_RECIPROCAL: f32 = 1e30;
 
 /// Which instructions the tests use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,7 +32,7 @@ pub(crate) enum Isa {
         allow(dead_code, reason = "the fallback, and the tests' reference")
     )]
     Portable,
-    /// x86-64 with AVX2, BMI1 and POPCNT, found at run time. Only [`Isa::detect`] makes it.
+    /// x86-64 with AVX2, FMA, BMI1 and POPCNT, found at run time. Only [`Isa::detect`] makes it.
     #[cfg(target_arch = "x86_64")]
     Avx2(avx2::Detected),
 }
@@ -65,42 +70,46 @@ pub(crate) trait Eight: Copy {
 pub(crate) trait Kernel {
     type Eight: Eight;
 
-    /// Bit i: the ray meets box i at some t in [0, t_max]; and each child with where its box is entered.
-    fn boxes(node: &Node, ray: &SlabRay, t_max: f32) -> (u32, [Entry; 8]);
+    /// Bit i: the ray meets box i at some t in [0, t_max]; and where each is entered.
+    fn boxes(node: &Node, ray: &SlabRay, t_max: f32) -> (u32, Self::Eight);
 
-    /// Asks for these items to be brought near the processor, if it can be asked.
-    fn fetch<T>(items: &[T], range: Range<usize>);
+    /// Each child with where its box is entered.
+    fn entries(node: &Node, near: Self::Eight) -> [Entry; 8];
+
+    /// A plane of each child's box: see [`Node::plane`].
+    fn planes(node: &Node, row: usize) -> Self::Eight;
+
+    /// Asks for the memory of two lines of the cache to be brought near the processor, if it can be asked.
+    fn fetch(place: *const u8);
 
     /// The triangles that the ray meets at 0 < t ≤ t_max < ∞.
-    fn triangles(pack: &Pack, ray: &ShearRay, t_max: f32) -> Lanes;
+    fn triangles(leaf: Leaf<'_>, ray: &ShearRay, t_max: f32) -> Lanes;
 }
 
-/// Four triangles: `vertex[corner][axis][lane]`. Unused lanes repeat a used one.
-#[repr(C, align(16))]
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Pack {
-    pub(crate) vertex: [[[f32; 4]; 3]; 3],
-    pub(crate) primitive: [u32; 4],
-}
-
-/// What four triangles answer; lanes whose bit is not in `mask` hold nothing of meaning.
+/// What the triangles of a leaf answer; lanes whose bit is not in `mask` hold nothing of meaning.
 #[derive(Clone, Copy)]
 pub(crate) struct Lanes {
     pub(crate) mask: u32,
-    pub(crate) t: [f32; 4],
+    pub(crate) t: [f32; MOST_TRIANGLES],
     /// Barycentric weight of the second vertex.
-    pub(crate) v: [f32; 4],
+    pub(crate) v: [f32; MOST_TRIANGLES],
     /// Barycentric weight of the third vertex.
-    pub(crate) w: [f32; 4],
+    pub(crate) w: [f32; MOST_TRIANGLES],
+}
+
+impl Lanes {
+    const NONE: Lanes = {
+        let zero = [0.0; MOST_TRIANGLES];
+        Lanes { mask: 0, t: zero, v: zero, w: zero }
+    };
 }
 
 /// A ray prepared for boxes.
 #[derive(Clone, Copy)]
 pub(crate) struct SlabRay {
-    pub(crate) origin: [f32; 3],
-    /// 1 / direction; ±∞ where the ray is parallel to a pair of sides. In the plane of one of them its entry is 0 · ∞ = NaN,
-    /// which the minima and maxima of the box test leave out.
-    pub(crate) reciprocal: [f32; 3],
+    pub(crate) origin: Vec3A,
+    /// 1 / direction, at most [`LARGEST_RECIPROCAL`] in size.
+    pub(crate) reciprocal: Vec3A,
     /// Per axis: 1 if the ray runs downwards and enters through the high side.
     pub(crate) entry: [usize; 3],
 }
@@ -108,11 +117,12 @@ pub(crate) struct SlabRay {
 impl SlabRay {
     #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> SlabRay {
-        let reciprocal = ray.direction.recip().to_array();
+        let most = Vec3A::splat(LARGEST_RECIPROCAL);
+        let reciprocal = ray.direction.recip().clamp(-most, most);
         SlabRay {
-            origin: ray.origin.to_array(),
+            origin: ray.origin,
             reciprocal,
-            entry: reciprocal.map(|r| usize::from(r < 0.0)),
+            entry: reciprocal.to_array().map(|r| usize::from(r < 0.0)),
         }
     }
 }
@@ -230,29 +240,40 @@ impl Eight for PortableEight {
 impl Kernel for Portable {
     type Eight = PortableEight;
 
+    /// q (s r) + (o − a) r for each plane; see [`Node`].
     #[inline(always)]
-    fn boxes(node: &Node, ray: &SlabRay, t_max: f32) -> (u32, [Entry; 8]) {
-        let plane = |axis: usize, far: usize, lane: usize| {
-            let side = node.bounds[2 * axis + (ray.entry[axis] ^ far)][lane];
-            (side - ray.origin[axis]) * ray.reciprocal[axis]
-        };
-        let mut near = [0.0; 8];
-        let mut far = [0.0; 8];
-        for lane in 0..8 {
-            let (near, far) = (&mut near[lane], &mut far[lane]);
-            *far = t_max;
-            for axis in 0..3 {
-                *near = max(plane(axis, 0, lane), *near);
-                *far = min(plane(axis, 1, lane), *far);
+    fn boxes(node: &Node, ray: &SlabRay, t_max: f32) -> (u32, PortableEight) {
+        let (mut near, mut far) = ([0.0; 8], [t_max; 8]);
+        for axis in 0..3 {
+            let first = (node.origin()[axis] - ray.origin[axis]) * ray.reciprocal[axis];
+            let step = node.step()[axis] * ray.reciprocal[axis];
+            let enters = node.counts(2 * axis + ray.entry[axis]);
+            let leaves = node.counts(2 * axis + (ray.entry[axis] ^ 1));
+            for lane in 0..8 {
+                near[lane] = max(f32::from(enters[lane]) * step + first, near[lane]);
+                far[lane] = min(f32::from(leaves[lane]) * step + first, far[lane]);
             }
         }
-        let mask =
-            (0..8).map(|lane| u32::from(near[lane] <= far[lane] * SLAB_MARGIN) << lane).sum();
-        (mask, std::array::from_fn(|slot| Entry::new(node.child[slot], near[slot])))
+        let meets = |lane: usize| {
+            let [near, far] = [near[lane], far[lane]].map(|t| t.to_bits() as i32);
+            near < far + SLAB_MARGIN_ULPS
+        };
+        let mask: u32 = (0..8).map(|lane| u32::from(meets(lane)) << lane).sum();
+        (mask & node.used(), PortableEight(near))
     }
 
     #[inline(always)]
-    fn fetch<T>(_items: &[T], _range: Range<usize>) {}
+    fn entries(node: &Node, near: PortableEight) -> [Entry; 8] {
+        std::array::from_fn(|slot| Entry::new(node.child[slot], near.0[slot]))
+    }
+
+    #[inline(always)]
+    fn planes(node: &Node, row: usize) -> PortableEight {
+        PortableEight(std::array::from_fn(|slot| node.plane(row, slot)))
+    }
+
+    #[inline(always)]
+    fn fetch(_place: *const u8) {}
 
     /// With A, B, C the vertices in the ray's sheared space, seen along the ray:
     ///
@@ -263,13 +284,14 @@ impl Kernel for Portable {
     /// precision, which holds the products exactly, decides; what is zero then counts as inside for both triangles at
     /// the edge. Hence no ray slips between triangles that share vertices.
     #[inline(always)]
-    fn triangles(pack: &Pack, ray: &ShearRay, t_max: f32) -> Lanes {
+    fn triangles(leaf: Leaf<'_>, ray: &ShearRay, t_max: f32) -> Lanes {
         let [kx, ky, kz] = ray.axes;
         let [sx, sy, sz] = ray.shear;
-        let mut lanes = Lanes { mask: 0, t: [0.0; 4], v: [0.0; 4], w: [0.0; 4] };
-        for lane in 0..4 {
+        let mut lanes = Lanes::NONE;
+        for lane in 0..leaf.triangles() {
             let sheared = |corner: usize| {
-                let from_origin = |axis: usize| pack.vertex[corner][axis][lane] - ray.origin[axis];
+                let place = leaf.corner(lane, corner);
+                let from_origin = |axis: usize| place[axis] - ray.origin[axis];
                 let z = from_origin(kz);
                 (from_origin(kx) - sx * z, from_origin(ky) - sy * z, sz * z)
             };

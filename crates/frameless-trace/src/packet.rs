@@ -3,13 +3,14 @@
 //! A node's boxes are tested against the beam that the rays form, by interval arithmetic: with o in [o⁻, o⁺] the origins and r in [r⁻, r⁺]
 //! the reciprocal directions, all of one sign, a plane p is met at (p − o)·r. That is least at one of o⁻ and o⁺, by the sign of r, and at r⁻
 //! or r⁺, and greatest at the other origin. Rounding is monotonic, so that the bounds hold for what each ray alone would compute. A leaf's
-//! own box is tested for each ray by the operations that the ray alone would use, and those of the nodes above contain it. What is found is the
-//! same, bit for bit, as for each ray alone: triangles are tested by the same operations, too, and which of several hits is best, or whether
-//! there is one, does not depend on their order.
+//! own box is tested for each ray. Boxes have room for what rounding takes, here as on a ray's own way (see [`crate::wide`]), so that no test
+//! loses a triangle. What is found is the same, bit for bit, as for each ray alone: triangles are tested by the same operations, and which of
+//! several hits is best, or whether there is one, does not depend on their order.
 
 use glam::Vec3A;
 
-use crate::kernel::{Eight, Kernel, Pack, SLAB_MARGIN, ShearRay};
+use crate::kernel::{Eight, Kernel, SLAB_MARGIN, ShearRay};
+use crate::leaf::Leaf;
 use crate::ray::{Hit, Ray};
 use crate::traverse::{Entry, Stack};
 use crate::wide::{Child, Node};
@@ -156,10 +157,10 @@ impl Packet {
 
     // Small functions instead of closures, since those cannot be made to be inlined, and calls would cost more than what is in them.
 
-    /// The plane through which rays enter a child's box, or leave it, in the node's rows.
+    /// The planes through which rays enter the children's boxes, or leave them, as the node has them.
     #[inline(always)]
-    fn row<'n>(&self, node: &'n Node, axis: usize, leaves: usize) -> &'n [f32; 8] {
-        &node.bounds[2 * axis + ((self.entry[axis] ^ leaves) & 1)]
+    fn row(&self, axis: usize, leaves: usize) -> usize {
+        2 * axis + ((self.entry[axis] ^ leaves) & 1)
     }
 
     /// The children that the beam meets before any of its rays has hit something, and where at the earliest.
@@ -171,12 +172,12 @@ impl Packet {
             let last = K::Eight::splat(self.last_origin[axis]);
             let least = K::Eight::splat(self.least_reciprocal[axis]);
             let most = K::Eight::splat(self.most_reciprocal[axis]);
-            let enters = K::Eight::load(self.row(node, axis, 0)).sub(first);
-            let leaves = K::Eight::load(self.row(node, axis, 1)).sub(last);
+            let enters = K::planes(node, self.row(axis, 0)).sub(first);
+            let leaves = K::planes(node, self.row(axis, 1)).sub(last);
             near = enters.mul(least).min(enters.mul(most)).max(near);
             far = leaves.mul(least).max(leaves.mul(most)).min(far);
         }
-        (near.at_most(far.mul(K::Eight::splat(SLAB_MARGIN))), near.store())
+        (near.at_most(far.mul(K::Eight::splat(SLAB_MARGIN))) & node.used(), near.store())
     }
 
     /// Bit i: ray i meets a child's box.
@@ -191,8 +192,8 @@ impl Packet {
         for axis in 0..3 {
             let origin = K::Eight::load(&self.origin[axis][half]);
             let reciprocal = K::Eight::load(&self.reciprocal[axis][half]);
-            let enters = K::Eight::splat(self.row(node, axis, 0)[slot & 7]).sub(origin);
-            let leaves = K::Eight::splat(self.row(node, axis, 1)[slot & 7]).sub(origin);
+            let enters = K::Eight::splat(node.plane(self.row(axis, 0), slot)).sub(origin);
+            let leaves = K::Eight::splat(node.plane(self.row(axis, 1), slot)).sub(origin);
             near = enters.mul(reciprocal).max(near);
             far = leaves.mul(reciprocal).min(far);
         }
@@ -201,29 +202,29 @@ impl Packet {
 
     /// A corner of a triangle in the sheared space of eight rays.
     #[inline(always)]
-    fn sheared<K: Kernel>(
-        &self,
-        corner: &[[f32; 4]; 3],
-        lane: usize,
-        half: usize,
-    ) -> [K::Eight; 3] {
+    fn sheared<K: Kernel>(&self, corner: [f32; 3], half: usize) -> [K::Eight; 3] {
         let [kx, ky, kz] = self.axes;
-        let x = K::Eight::splat(corner[kx][lane & 3]).sub(K::Eight::load(&self.origin[kx][half]));
-        let y = K::Eight::splat(corner[ky][lane & 3]).sub(K::Eight::load(&self.origin[ky][half]));
-        let z = K::Eight::splat(corner[kz][lane & 3]).sub(K::Eight::load(&self.origin[kz][half]));
+        let x = K::Eight::splat(corner[kx]).sub(K::Eight::load(&self.origin[kx][half]));
+        let y = K::Eight::splat(corner[ky]).sub(K::Eight::load(&self.origin[ky][half]));
+        let z = K::Eight::splat(corner[kz]).sub(K::Eight::load(&self.origin[kz][half]));
         let sx = K::Eight::load(&self.shear[0][half]);
         let sy = K::Eight::load(&self.shear[1][half]);
         let sz = K::Eight::load(&self.shear[2][half]);
         [x.sub(sx.mul(z)), y.sub(sy.mul(z)), sz.mul(z)]
     }
 
-    /// One triangle of a pack and eight rays, as [`Kernel::triangles`] for each: which hit it, which have to be asked alone since they
+    /// One triangle of a leaf and eight rays, as [`Kernel::triangles`] for each: which hit it, which have to be asked alone since they
     /// meet an edge; and t and the weights of the second and third vertex.
     #[inline(always)]
-    fn meet<K: Kernel>(&self, pack: &Pack, lane: usize, half: usize) -> (u32, u32, [K::Eight; 3]) {
-        let [ax, ay, az] = self.sheared::<K>(&pack.vertex[0], lane, half);
-        let [bx, by, bz] = self.sheared::<K>(&pack.vertex[1], lane, half);
-        let [cx, cy, cz] = self.sheared::<K>(&pack.vertex[2], lane, half);
+    fn meet<K: Kernel>(
+        &self,
+        leaf: Leaf<'_>,
+        lane: usize,
+        half: usize,
+    ) -> (u32, u32, [K::Eight; 3]) {
+        let [ax, ay, az] = self.sheared::<K>(leaf.corner(lane, 0), half);
+        let [bx, by, bz] = self.sheared::<K>(leaf.corner(lane, 1), half);
+        let [cx, cy, cz] = self.sheared::<K>(leaf.corner(lane, 2), half);
         let u = cx.mul(by).sub(cy.mul(bx));
         let v = ax.mul(cy).sub(ay.mul(cx));
         let w = bx.mul(ay).sub(by.mul(ax));
@@ -315,10 +316,10 @@ impl<A: Fn(u32) -> bool> Finds for Any<A> {
 }
 
 /// Tells `finds` of the hits; returns how many leaves were visited and how many rays were in them. `place`: instance and triangle of what is
-/// in the packs.
+/// in the leaves.
 #[inline(always)]
 pub(crate) fn walk_together<K: Kernel>(
-    (nodes, packs): (&[Node], &[Pack]),
+    (nodes, leaves): (&[Node], &[u32]),
     packet: &mut Packet,
     finds: &mut impl Finds,
     stack: &mut Stack,
@@ -334,11 +335,8 @@ pub(crate) fn walk_together<K: Kernel>(
             let node = &nodes[came_from >> 3];
             let rays = packet.rays_in::<K>(node, came_from & 7);
             met = [met[0] + 1, met[1] + rays.count_ones()];
-            let mut found = false;
-            for pack in &packs[current.items()] {
-                found |= visit::<K>(pack, packet, rays, finds, &place);
-            }
-            if found {
+            let leaf = Leaf::at(leaves, current.place());
+            if visit::<K>(leaf, packet, rays, finds, &place) {
                 farthest = packet.farthest();
             }
         } else {
@@ -369,10 +367,10 @@ pub(crate) fn walk_together<K: Kernel>(
     }
 }
 
-/// A pack against some of the rays. Whether any range has become shorter.
+/// A leaf against some of the rays. Whether any range has become shorter.
 #[inline(always)]
 fn visit<K: Kernel>(
-    pack: &Pack,
+    leaf: Leaf<'_>,
     packet: &mut Packet,
     rays: u32,
     finds: &mut impl Finds,
@@ -380,27 +378,24 @@ fn visit<K: Kernel>(
 ) -> bool {
     let mut found = false;
     if rays.count_ones() <= FEW {
-        alone::<K>(pack, packet, rays, finds, place, &mut found);
+        alone::<K>(leaf, packet, rays, finds, place, &mut found);
         return found;
     }
-    for lane in 0..4 {
-        if lane > 0 && pack.primitive[lane] == pack.primitive[lane - 1] {
-            break;
-        }
+    for lane in 0..leaf.triangles() {
         for half in 0..2 {
             let asked = rays >> (8 * half) & 0xff;
             if asked == 0 {
                 continue;
             }
-            let (hit, on_edge, [t, v, w]) = packet.meet::<K>(pack, lane, half);
+            let (hit, on_edge, [t, v, w]) = packet.meet::<K>(leaf, lane, half);
             let (mut hit, on_edge) = (hit & asked, on_edge & asked);
             if on_edge != 0 {
-                alone::<K>(pack, packet, on_edge << (8 * half), finds, place, &mut found);
+                alone::<K>(leaf, packet, on_edge << (8 * half), finds, place, &mut found);
             }
             if hit == 0 {
                 continue;
             }
-            let (instance, primitive) = place(pack.primitive[lane]);
+            let (instance, primitive) = place(leaf.triangle(lane));
             let (t, v, w) = (t.store(), v.store(), w.store());
             while hit != 0 {
                 let ray = hit.trailing_zeros() as usize & 7;
@@ -417,10 +412,10 @@ fn visit<K: Kernel>(
     found
 }
 
-/// A pack against some rays, one by one.
+/// A leaf against some rays, one by one.
 #[inline(always)]
 fn alone<K: Kernel>(
-    pack: &Pack,
+    leaf: Leaf<'_>,
     packet: &mut Packet,
     mut rays: u32,
     finds: &mut impl Finds,
@@ -430,12 +425,12 @@ fn alone<K: Kernel>(
     while rays != 0 {
         let ray = rays.trailing_zeros() as usize % TOGETHER;
         rays &= rays - 1;
-        let lanes = K::triangles(pack, &packet.one(ray), packet.t_max[ray / 8][ray % 8]);
+        let lanes = K::triangles(leaf, &packet.one(ray), packet.t_max[ray / 8][ray % 8]);
         let mut mask = lanes.mask;
         while mask != 0 {
             let lane = mask.trailing_zeros() as usize & 3;
             mask &= mask - 1;
-            let (instance, primitive) = place(pack.primitive[lane]);
+            let (instance, primitive) = place(leaf.triangle(lane));
             let barycentric = [lanes.v[lane], lanes.w[lane]];
             let hit = Hit { t: lanes.t[lane], barycentric, primitive, instance };
             if let Some(t_max) = finds.hit(ray, &hit) {

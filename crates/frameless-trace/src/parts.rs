@@ -1,223 +1,183 @@
-//! Many boxes, divided into parts over which trees are built by themselves: on all cores, and with the builder's memory for a few parts at
-//! a time instead of for everything (it takes about 300 bytes per box, several times as much as a triangle).
+//! Many triangles, divided into parts over which trees are built by themselves: on all cores, and with the builder's memory for a few parts
+//! at a time instead of for everything (it takes about 200 bytes per triangle, six times as much as is left of it).
 //!
-//! Boxes are divided from above by the surface area heuristic, as far as sixteen planes per axis tell it (Wald 2007, "On fast construction
-//! of SAH-based bounding volume hierarchies"):
+//! Triangles are divided from above by the surface area heuristic (see [`crate::sah`]).
 //!
-//! ```text
-//! C(k) = A(left of plane k) · n(left) + A(right) · n(right)        A: half the surface of the box around; the plane of least C divides
-//! ```
-//!
-//! The parts depend on the boxes alone, not on how many threads there are.
+//! Of each part's tree the largest nodes are taken away, and one tree is built over what is left of all of them: a wall that lies in one part
+//! would make it as large as the room. The parts depend on the triangles alone, not on how many threads there are.
 
 use std::ops::Range;
 
-use glam::Vec3A;
+use glam::Vec3;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::node::Bvh2Node;
-use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use rayon::prelude::*;
 
-/// Boxes of a part at most. Fewer: more of the tree is divided by planes instead of clustered; more: memory, and cores with nothing to do.
-pub(crate) const PART: usize = 1 << 13;
+use crate::build::{self, Root, Tree, Triangles, binary_tree, halve, sane_box};
+use crate::collapse::{Collapse, bounds};
+use crate::leaf::LONGEST;
+use crate::sah::split;
+use crate::traverse::STACK_PER_TREE;
+use crate::wide::Child;
 
-/// Of all nodes, those that are placed again once the parts are one tree; and how often, since of two that get into each other's way one stays.
-const LARGE_ONES: f32 = 0.05;
-const ROUNDS: u32 = 4;
+/// Triangles of a part at most. Fewer: boxes find better places among fewer; more: memory, and cores with nothing to do.
+const PART: usize = 1 << 13;
 
-/// Planes per axis, and one.
-const BINS: usize = 16;
+/// For so many triangles of a part there is a tree that finds its place among those of all parts. Fewer: rays visit less of the tree, which takes
+/// longer to build.
+const PER_ROOT: usize = 16;
 
-/// What a tree is over.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Of {
-    /// The boxes of a part.
-    Boxes,
-    /// The parts, each of which has to have a leaf of its own.
-    Parts,
-}
+/// Of the trees that find their place those that do so again.
+const REINSERTED: f32 = 1.0;
 
-/// Builds one tree over all boxes: those over the parts, and the one over these, by `build`.
-pub(crate) fn build_in_parts(boxes: &[Aabb], build: impl Fn(&[Aabb], Of) -> Bvh2 + Sync) -> Bvh2 {
-    let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
-    let parts = divide(boxes, &mut order);
-    let built: Vec<Bvh2> = parts
-        .into_par_iter()
-        .map(|part| {
-            let members = &order[part];
-            let boxes: Vec<Aabb> = members.iter().map(|&member| boxes[member as usize]).collect();
-            let mut tree = build(&boxes, Of::Boxes);
-            let indices = tree.primitive_indices.iter().map(|&index| members[index as usize]);
-            tree.primitive_indices = indices.collect();
-            // Nobody asks any longer.
-            tree.parents = Vec::new();
-            tree
-        })
-        .collect();
-    drop(order);
-    let roots: Vec<Aabb> = built.iter().map(|part| *part.nodes[0].aabb()).collect();
-    let mut all = join(&build(&roots, Of::Parts), built);
-    place_large_ones(&mut all);
+/// Of the stack's entries those that a part may need. Halving 2¹³ triangles needs 7 · 13 at most.
+const STACK_PER_PART: usize = 96;
+
+/// The box around a triangle, which alignment would make a third larger.
+type Box = [Vec3; 2];
+
+/// Of a triangle that no tree may hold.
+const NOWHERE: Box = [Vec3::INFINITY; 2];
+
+/// Builds a tree: no node and no root if there are no triangles that can be hit, else one root.
+pub(crate) fn build(triangles: &impl Triangles) -> Tree {
+    let boxes = boxes(triangles);
+    let mut order: Vec<u32> = (0..triangles.count()).collect();
+    order.retain(|&triangle| boxes[triangle as usize] != NOWHERE);
+    if order.is_empty() {
+        return Tree::default();
+    }
+    if order.len() <= PART {
+        return build::build(triangles, &order, 1, STACK_PER_TREE);
+    }
+    let parts = divide(&boxes, &mut order);
+    // They are made again part by part: there is no room for all of them beside the tree.
+    drop(boxes);
+    let mut all = Tree::with_room_for(order.len());
+    for some in parts.chunks(4 * rayon::current_num_threads()) {
+        let build = |part: &Range<usize>| {
+            let roots = (part.len() / PER_ROOT).max(2);
+            build::build(triangles, &order[part.clone()], roots, STACK_PER_PART)
+        };
+        let built: Vec<Tree> = some.par_iter().map(build).collect();
+        built.into_iter().for_each(|part| all.append(part));
+    }
+    all.join();
     all
 }
 
-/// Lets the largest boxes find a better place in the whole tree: a wall that lies in one part makes it as large as the room.
-fn place_large_ones(all: &mut Bvh2) {
-    let count = ((LARGE_ONES * all.nodes.len() as f32) as usize).max(1);
-    let area = |&node: &u32| all.nodes[node as usize].aabb().half_area();
-    let mut nodes: Vec<u32> = (1..all.nodes.len() as u32).collect();
-    nodes.select_nth_unstable_by(count, |a, b| area(b).total_cmp(&area(a)).then(a.cmp(b)));
-    nodes.truncate(count);
-    ReinsertionOptimizer::default().run_with_candidates(all, &nodes, ROUNDS);
-    all.parents = Vec::new();
+fn boxes(triangles: &impl Triangles) -> Vec<Box> {
+    let all = (0..triangles.count()).into_par_iter();
+    all.map(|triangle| sane_box(&triangles.corners(triangle)).unwrap_or(NOWHERE)).collect()
 }
 
-/// Puts the parts in the place of the leaves of the tree over them.
-fn join(top: &Bvh2, parts: Vec<Bvh2>) -> Bvh2 {
-    let mut all = Bvh2::zeroed(0);
-    let in_parts: usize = parts.iter().map(|part| part.nodes.len()).sum();
-    all.nodes.reserve_exact(top.nodes.len() + in_parts);
-    all.nodes.extend_from_slice(&top.nodes);
-    all.primitive_indices
-        .reserve_exact(parts.iter().map(|part| part.primitive_indices.len()).sum());
-    let mut leaf_of = vec![0; parts.len()];
-    for (node, index) in top.nodes.iter().zip(0usize..).filter(|(node, _)| node.is_leaf()) {
-        let first = node.first_index as usize;
-        assert_eq!(node.prim_count, 1, "the tree over the parts has a leaf for each");
-        leaf_of[top.primitive_indices[first] as usize] = index;
+impl Tree {
+    /// Memory that is not used is given back when the tree is done; until then it is none of the machine's.
+    fn with_room_for(triangles: usize) -> Tree {
+        /// A leaf with one triangle. All others take less for each.
+        const WORDS: usize = 2 + 1 + 9;
+        /// Leaves have more than two triangles on average, nodes more than two children.
+        const TRIANGLES_PER_NODE: usize = 4;
+        Tree {
+            nodes: Vec::with_capacity(triangles / TRIANGLES_PER_NODE),
+            leaves: Vec::with_capacity(WORDS * triangles + LONGEST),
+            roots: Vec::new(),
+        }
     }
-    for (part, leaf) in parts.into_iter().zip(leaf_of) {
-        // Of a part's nodes all but the root move, in pairs, behind those that are there.
-        let (nodes, indices) = (all.nodes.len() as u32, all.primitive_indices.len() as u32);
-        let mut placed = part.nodes.iter().map(|node| {
-            let by = if node.is_leaf() { indices } else { nodes.wrapping_sub(1) };
-            Bvh2Node { first_index: node.first_index.wrapping_add(by), ..*node }
-        });
-        all.nodes[leaf] = placed.next().expect("a part has a root");
-        all.nodes.extend(placed);
-        all.primitive_indices.extend_from_slice(&part.primitive_indices);
+
+    fn append(&mut self, part: Tree) {
+        let (nodes, leaves) = (self.nodes.len(), self.leaves.len());
+        self.nodes.extend(part.nodes.into_iter().map(|node| node.moved(nodes, leaves)));
+        self.leaves.extend(part.leaves);
+        let roots = part.roots.into_iter();
+        self.roots
+            .extend(roots.map(|root| Root { child: root.child.moved(nodes, leaves), ..root }));
     }
-    all
+
+    /// Builds the tree over the trees, in front of them.
+    fn join(&mut self) {
+        let boxes = self.roots.iter().map(|root| Aabb::new(root.bounds[0], root.bounds[1]));
+        let boxes: Vec<Aabb> = boxes.collect();
+        let most_below = self.roots.iter().map(|root| root.stack_need).max().unwrap_or(0);
+        let mut collapse = Collapse::default();
+        let mut make = |binary: &Bvh2, moved_by: usize| {
+            let mut nodes = Vec::new();
+            collapse.plan(binary, 1.0, |_| false);
+            let stack_need = collapse.make_root(binary, &mut nodes, |root| {
+                self.roots[root[0] as usize].child.moved(moved_by, 0)
+            });
+            (nodes, stack_need + most_below)
+        };
+        let mut binary = binary_tree(&boxes, REINSERTED);
+        if make(&binary, 0).1 > STACK_PER_TREE {
+            binary = halve(&boxes);
+        }
+        // How many nodes there are is known only once there are all.
+        let front = make(&binary, 0).0.len();
+        let (nodes, stack_need) = make(&binary, front);
+        self.nodes.iter_mut().for_each(|node| *node = node.moved(front, 0));
+        self.nodes.extend(nodes);
+        self.nodes.rotate_right(front);
+        self.roots = vec![Root { bounds: bounds(&binary, 0), child: Child::ROOT, stack_need }];
+    }
 }
 
-/// Orders the boxes so that each part is a range of them.
-fn divide(boxes: &[Aabb], order: &mut [u32]) -> Vec<Range<usize>> {
-    fn halve(boxes: &[Aabb], order: &mut [u32], first: usize) -> Vec<Range<usize>> {
+fn of(boxes: &[Box], triangle: u32) -> Aabb {
+    let [low, high] = boxes[triangle as usize];
+    Aabb::new(low.into(), high.into())
+}
+
+/// Orders the triangles so that each part is a range of them.
+fn divide(boxes: &[Box], order: &mut [u32]) -> Vec<Range<usize>> {
+    fn parts(boxes: &[Box], order: &mut [u32], first: usize) -> Vec<Range<usize>> {
         if order.len() <= PART {
             return std::iter::once(first..first + order.len()).collect();
         }
-        let at = split(boxes, order);
+        let at = split(&|member| of(boxes, member), order);
         let (left, right) = order.split_at_mut(at);
-        let (mut parts, more) =
-            rayon::join(|| halve(boxes, left, first), || halve(boxes, right, first + at));
-        parts.extend(more);
-        parts
+        let (mut all, more) =
+            rayon::join(|| parts(boxes, left, first), || parts(boxes, right, first + at));
+        all.extend(more);
+        all
     }
-    halve(boxes, order, 0)
-}
-
-/// Half-open bins along one axis.
-#[derive(Clone, Copy)]
-struct Bin {
-    bounds: Aabb,
-    count: usize,
-}
-
-const NO_BIN: Bin = Bin { bounds: Aabb::INVALID, count: 0 };
-
-/// Brings the members on one side of the best plane before the others; returns how many they are: at least one, and not all.
-fn split(boxes: &[Aabb], order: &mut [u32]) -> usize {
-    // Twice the centres.
-    let centre = |member: u32| boxes[member as usize].min + boxes[member as usize].max;
-    let centres =
-        order.iter().fold(Aabb::INVALID, |mut around, &member| *around.extend(centre(member)));
-    let width = centres.max - centres.min;
-    let scale = Vec3A::splat(BINS as f32 * (1.0 - f32::EPSILON))
-        / width.max(Vec3A::splat(f32::MIN_POSITIVE));
-    let bin =
-        |member: u32| ((centre(member) - centres.min) * scale).min(Vec3A::splat(BINS as f32 - 1.0));
-    let mut bins = [[NO_BIN; BINS]; 3];
-    for &member in &*order {
-        let bounds = boxes[member as usize];
-        for (bins, at) in bins.iter_mut().zip(bin(member).to_array()) {
-            let bin = &mut bins[at as usize];
-            bin.bounds = bin.bounds.union(&bounds);
-            bin.count += 1;
-        }
-    }
-    let best = (0..3).filter_map(|axis| Some((axis, best_plane(&bins[axis])?)));
-    let best = best.min_by(|(_, a), (_, b)| a.cost.total_cmp(&b.cost));
-    let Some((axis, Plane { bin: plane, .. })) = best else {
-        // All in one place: it does not matter.
-        return order.len() / 2;
-    };
-    let is_left = |&member: &u32| (bin(member)[axis] as usize) < plane;
-    partition(order, is_left)
-}
-
-/// The plane before a bin, and what it costs.
-struct Plane {
-    bin: usize,
-    cost: f32,
-}
-
-/// `None` if all are in one bin.
-fn best_plane(bins: &[Bin; BINS]) -> Option<Plane> {
-    let mut right = [NO_BIN; BINS];
-    let mut sum = NO_BIN;
-    for (right, bin) in right.iter_mut().zip(bins).rev() {
-        sum = both(sum, *bin);
-        *right = sum;
-    }
-    let mut left = NO_BIN;
-    let mut best: Option<Plane> = None;
-    for bin in 1..BINS {
-        left = both(left, bins[bin - 1]);
-        if left.count == 0 || right[bin].count == 0 {
-            continue;
-        }
-        let work = |side: Bin| side.bounds.half_area() * side.count as f32;
-        let cost = work(left) + work(right[bin]);
-        if best.as_ref().is_none_or(|best| cost < best.cost) {
-            best = Some(Plane { bin, cost });
-        }
-    }
-    best
-}
-
-fn both(a: Bin, b: Bin) -> Bin {
-    Bin { bounds: a.bounds.union(&b.bounds), count: a.count + b.count }
-}
-
-/// Those that are left first, in no particular but always the same order.
-fn partition(order: &mut [u32], is_left: impl Fn(&u32) -> bool) -> usize {
-    let mut left = 0;
-    for i in 0..order.len() {
-        if is_left(&order[i]) {
-            order.swap(left, i);
-            left += 1;
-        }
-    }
-    left
+    parts(boxes, order, 0)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::time::Instant;
+
     use frameless::Rng;
+    use glam::Vec3A;
 
     use super::*;
-    use crate::build::{binary_by_median, cluster};
+    use crate::leaf::{Corner, Leaf};
+    use crate::wide::Node;
 
-    fn scattered(count: usize) -> Vec<Aabb> {
+    /// Triangles by their corners.
+    struct Loose(Vec<[Vec3; 3]>);
+
+    impl Triangles for Loose {
+        fn count(&self) -> u32 {
+            self.0.len() as u32
+        }
+
+        fn corners(&self, triangle: u32) -> [Corner; 3] {
+            self.0[triangle as usize].map(|at| Corner { at, name: at.to_array().map(f32::to_bits) })
+        }
+    }
+
+    fn scattered(count: usize) -> Loose {
         let mut rng = Rng::new(7);
-        let mut point = || Vec3A::from_array(std::array::from_fn(|_| rng.unit_f32()));
-        (0..count).map(|_| Aabb::from_points(&[point(), point()])).collect()
+        let mut point = || Vec3::from_array(std::array::from_fn(|_| rng.unit_f32()));
+        Loose((0..count).map(|_| [point(), point(), point()]).collect())
     }
 
     #[test]
-    fn parts_are_small_and_hold_every_box_once() {
-        for boxes in [scattered(5 * PART), vec![Aabb::new(Vec3A::ZERO, Vec3A::ONE); 3 * PART]] {
+    fn parts_are_small_and_hold_every_triangle_once() {
+        let alike = Loose(vec![[Vec3::ZERO, Vec3::X, Vec3::Y]; 3 * PART]);
+        for triangles in [scattered(5 * PART), alike] {
+            let boxes = boxes(&triangles);
             let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
             let parts = divide(&boxes, &mut order);
             assert!(parts.iter().all(|part| (1..=PART).contains(&part.len())));
@@ -228,46 +188,67 @@ mod tests {
         }
     }
 
-    /// Two crowds far from each other, one of them twice as large.
+    /// Trees over the same in one place, or at equal distances, are made as fast as any.
     #[test]
-    fn the_plane_lies_where_nothing_is() {
-        let place = |k: u32| if k.is_multiple_of(3) { Vec3A::X * 100.0 } else { Vec3A::ZERO };
-        let boxes: Vec<Aabb> = (0..3000)
-            .map(|k| (place(k), Vec3A::splat((k % 100) as f32 / 100.0)))
-            .map(|(place, jitter)| Aabb::new(place + jitter, place + jitter + 1.0))
-            .collect();
-        let mut order: Vec<u32> = (0..3000).collect();
-        let at = split(&boxes, &mut order);
-        assert_eq!(at, 2000);
-        assert!(order[..at].iter().all(|member| !member.is_multiple_of(3)));
+    fn triangles_that_are_alike_are_divided_in_time() {
+        const COUNT: u32 = 100_000;
+        let flat = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        let spread = [Vec3::ZERO, Vec3::X, Vec3::ONE];
+        let far = Vec3::splat(-1e14);
+        for (what, corners, step) in [
+            ("one flat triangle", flat, Vec3::ZERO),
+            ("one triangle", spread, Vec3::ZERO),
+            ("a point at the origin", [Vec3::ZERO; 3], Vec3::ZERO),
+            ("a point far away", [far; 3], Vec3::ZERO),
+            ("something tiny", spread.map(|corner| 1e-25 * corner), Vec3::ZERO),
+            ("a row", flat, Vec3::X),
+            ("a row of points", [Vec3::ZERO; 3], Vec3::X),
+            ("a dense row", spread, 0.0625 * Vec3::X),
+            ("a denormal row", [Vec3::ZERO; 3], 1e-42 * Vec3::X),
+        ] {
+            let place = |k: u32| corners.map(|corner| corner + k as f32 * step);
+            let triangles = Loose((0..COUNT).map(place).collect());
+            let begin = Instant::now();
+            let tree = build(&triangles);
+            let secs = begin.elapsed().as_secs_f64();
+            assert!(secs < 10.0, "{what}: {secs:.1} s");
+            assert!(tree.roots[0].stack_need <= STACK_PER_TREE, "{what}");
+        }
     }
 
+    /// One part, and several.
     #[test]
-    fn the_tree_of_parts_holds_every_box_where_it_is() {
-        let boxes = scattered(3 * PART + 5);
-        let all = build_in_parts(&boxes, |boxes, of| match of {
-            Of::Boxes => binary_by_median(boxes),
-            Of::Parts => cluster(boxes, 1),
-        });
-        let mut seen = vec![0; boxes.len()];
-        let mut work = vec![0];
-        while let Some(at) = work.pop() {
-            let node = all.nodes[at];
-            let first = node.first_index as usize;
-            let around = |inside: &Aabb| {
-                let [low, high] = [node.aabb().min, node.aabb().max];
-                inside.min.cmpge(low).all() && inside.max.cmple(high).all()
-            };
-            if node.is_leaf() {
-                for &member in &all.primitive_indices[first..first + node.prim_count as usize] {
-                    assert!(around(&boxes[member as usize]));
-                    seen[member as usize] += 1;
+    fn the_tree_holds_every_triangle_where_it_is() {
+        for count in [1, 3, 300, 3 * PART + 5] {
+            let triangles = scattered(count);
+            let Tree { nodes, mut leaves, roots } = build(&triangles);
+            leaves.extend([0; LONGEST]);
+            let mut seen = vec![0; count];
+            let mut work = vec![(roots[0].child, roots[0].bounds)];
+            while let Some((child, [low, high])) = work.pop() {
+                if child.is_leaf() {
+                    let leaf = Leaf::at(&leaves, child.place());
+                    for lane in 0..leaf.triangles() {
+                        let triangle = leaf.triangle(lane);
+                        seen[triangle as usize] += 1;
+                        for k in 0..3 {
+                            let corner = Vec3A::from(leaf.corner(lane, k));
+                            assert_eq!(corner, triangles.0[triangle as usize][k].into());
+                            assert!(corner.cmpge(low).all() && corner.cmple(high).all());
+                        }
+                    }
+                    continue;
                 }
-            } else {
-                assert!(around(all.nodes[first].aabb()) && around(all.nodes[first + 1].aabb()));
-                work.extend([first, first + 1]);
+                let node = &nodes[child.node()];
+                for slot in (0..8).filter(|&slot| node.child[slot] != Node::UNUSED) {
+                    let corner = |side: usize| {
+                        let along = |axis: usize| node.plane(2 * axis + side, slot);
+                        Vec3A::from_array([0, 1, 2].map(along))
+                    };
+                    work.push((node.child[slot], [corner(0), corner(1)]));
+                }
             }
+            assert!(seen.iter().all(|&count| count == 1));
         }
-        assert!(seen.iter().all(|&count| count == 1));
     }
 }

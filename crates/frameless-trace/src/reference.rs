@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use frameless::Rng;
 use frameless_scene::{Geometry, Mesh, Scene, Transform};
-use glam::{DVec3, Vec3, Vec3A};
+use glam::{Affine3A, DVec3, Vec3, Vec3A};
 
 use crate::World;
-use crate::build::corners;
-use crate::kernel::{Isa, Kernel, Pack, Portable, ShearRay};
+use crate::build::{corners, corners_at};
+use crate::kernel::{Isa, Kernel, Portable, ShearRay};
+use crate::leaf::{self, LONGEST, Leaf};
 use crate::packet::{Packet, TOGETHER};
 use crate::ray::{Hit, Ray};
 use crate::test_scenes as scenes;
@@ -40,9 +41,11 @@ fn closest(world: &World, rays: &[Ray]) -> Vec<Option<Hit>> {
 pub(crate) fn every_triangle(mesh: &Mesh, ray: &Ray) -> Vec<(u32, f32)> {
     let shear = ShearRay::new(ray);
     let hits = (0..mesh.triangles.len() as u32).filter_map(|primitive| {
-        let vertex = corners(mesh, primitive).map(|corner| corner.to_array().map(|c| [c; 4]));
-        let pack = Pack { vertex, primitive: [primitive; 4] };
-        let lanes = Portable::triangles(&pack, &shear, f32::MAX);
+        let mut words = Vec::new();
+        let triangle = (primitive, corners_at(&Affine3A::IDENTITY, mesh, primitive));
+        leaf::write(&mut words, &[triangle]);
+        words.resize(LONGEST, 0);
+        let lanes = Portable::triangles(Leaf::at(&words, 0), &shear, f32::MAX);
         (lanes.mask != 0).then_some((primitive, lanes.t[0]))
     });
     hits.collect()

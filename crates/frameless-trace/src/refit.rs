@@ -3,16 +3,15 @@
 //! How bad is told by the surface area heuristic (MacDonald & Booth 1990): the expected work of a ray that meets the root,
 //!
 //! ```text
-//! C = Σ_slots A(slot) / A(root) · c        c: 1 for an inner node, the number of packs for a leaf
+//! C = Σ_slots A(slot) / A(root)
 //! ```
 
 use frameless_scene::Mesh;
-use glam::{Vec3, Vec3A};
-use obvhs::aabb::Aabb;
+use glam::Vec3A;
 
-use crate::build::{Blas, FARTHEST};
-use crate::kernel::Pack;
-use crate::wide::Node;
+use crate::build::{Blas, FARTHEST, Triangles};
+use crate::leaf::{Corner, Leaf, vertices_at};
+use crate::wide::{Bounds, Child, NOTHING, Node, half_area, union};
 
 /// The tree is built anew when a ray's expected work has grown by this factor. Lower: more building, which takes as long as
 /// hundreds of refits; higher: slower rays. Walking, running and bending models that we have tried stay within it (at most 1.74).
@@ -22,43 +21,61 @@ const WORST: f32 = 1.8;
 #[derive(Clone, Debug)]
 pub(crate) struct Flexible {
     pub(crate) blas: Blas,
-    /// The vertices of the packs' triangles: `[corner][lane]`.
-    vertices: Vec<[[u32; 4]; 3]>,
-    /// Per pack and per node: the box around it.
-    pack_boxes: Vec<[Vec3A; 2]>,
-    node_boxes: Vec<[Vec3A; 2]>,
+    /// For each word of the leaves that is a vertex's x: which vertex. The others say nothing.
+    vertices: Vec<u32>,
+    /// Per node: the box around it.
+    boxes: Vec<Bounds>,
     /// C when the tree was built.
     cost_built: f32,
 }
 
+/// A mesh with its vertices elsewhere. It holds every triangle, since those that are nowhere now may be somewhere later.
+struct Bent<'a> {
+    mesh: &'a Mesh,
+    positions: &'a [Vec3A],
+}
+
+impl Triangles for Bent<'_> {
+    fn count(&self) -> u32 {
+        self.mesh.triangles.len() as u32
+    }
+
+    /// Or three times a point of it if it is not finite. Vertices that are at one place now may part.
+    fn corners(&self, triangle: u32) -> [Corner; 3] {
+        let vertices = self.mesh.triangles[triangle as usize];
+        let corners = vertices.map(|vertex| self.positions[vertex as usize]);
+        let corners = match corners.iter().all(is_sane) {
+            true => corners,
+            false => [corners.into_iter().find(is_sane).unwrap_or(Vec3A::ZERO); 3],
+        };
+        [0, 1, 2].map(|k| Corner { at: corners[k].into(), name: [vertices[k], 0, 0] })
+    }
+}
+
 impl Flexible {
-    /// A tree for the mesh with its vertices at `positions`. Unlike [`Blas::new`] it holds every triangle, since those that
-    /// are nowhere now may be somewhere later.
+    /// A tree for the mesh with its vertices at `positions`.
     pub(crate) fn new(mesh: &Mesh, positions: &[Vec3A]) -> Flexible {
-        let corners = |primitive: u32| {
-            sane(mesh.triangles[primitive as usize].map(|v| positions[v as usize]))
-        };
-        let primitives: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
-        let boxes = primitives.iter().map(|&primitive| Aabb::from_points(&corners(primitive)));
-        let boxes: Vec<Aabb> = boxes.collect();
-        let blas = Blas::over(&primitives, boxes, |primitive| corners(primitive).map(Vec3::from));
-        let vertices = blas.packs.iter().map(|pack| {
-            let lanes = pack.primitive.map(|primitive| mesh.triangles[primitive as usize]);
-            std::array::from_fn(|corner| lanes.map(|triangle| triangle[corner]))
-        });
-        let mut flexible = Flexible {
-            vertices: vertices.collect(),
-            pack_boxes: vec![NOTHING; blas.packs.len()],
-            node_boxes: vec![NOTHING; blas.nodes.len()],
-            blas,
-            cost_built: 0.0,
-        };
+        let blas = Blas::new(&Bent { mesh, positions });
+        let mut vertices = vec![u32::MAX; blas.leaves.len()];
+        let children = blas.nodes.iter().flat_map(|node| node.child);
+        for child in children.filter(|&child| child != Node::UNUSED && child.is_leaf()) {
+            let leaf = Leaf::at(&blas.leaves, child.place());
+            let (first, _) = vertices_at(&blas.leaves, child.place());
+            for lane in 0..leaf.triangles() {
+                let triangle = mesh.triangles[leaf.triangle(lane) as usize];
+                for (corner, vertex) in triangle.into_iter().enumerate() {
+                    vertices[first + leaf.vertex_of(lane, corner)] = vertex;
+                }
+            }
+        }
+        let boxes = vec![NOTHING; blas.nodes.len()];
+        let mut flexible = Flexible { blas, vertices, boxes, cost_built: 0.0 };
         flexible.cost_built = flexible.refit(positions);
         flexible
     }
 
     /// The tree with the vertices at `positions`, for which it is built anew if need be. Triangles with a vertex that is
-    /// infinite, NaN or too far away have no area, so that no ray meets them.
+    /// infinite, NaN or too far away are hit by no ray.
     pub(crate) fn update(&mut self, mesh: &Mesh, positions: &[Vec3A]) {
         if self.refit(positions) > WORST * self.cost_built {
             *self = Flexible::new(mesh, positions);
@@ -67,65 +84,36 @@ impl Flexible {
 
     /// Moves triangles and boxes; returns C.
     pub(crate) fn refit(&mut self, positions: &[Vec3A]) -> f32 {
-        let packs = self.blas.packs.iter_mut().zip(&self.vertices).zip(&mut self.pack_boxes);
-        if are_all_sane(positions) {
-            packs.for_each(|((pack, vertices), bounds)| {
-                *bounds = move_pack(pack, vertices, positions, |triangle| triangle);
-            });
-        } else {
-            packs.for_each(|((pack, vertices), bounds)| {
-                *bounds = move_pack(pack, vertices, positions, sane);
-            });
+        match are_all_sane(positions) {
+            true => self.fit_boxes(positions, |_| true),
+            false => self.fit_boxes(positions, is_sane),
         }
-        self.fit_boxes()
     }
 
     /// Boxes from the leaves up: children come after their parents. Returns C.
-    fn fit_boxes(&mut self) -> f32 {
-        let Flexible { blas: Blas { nodes, bounds, .. }, pack_boxes, node_boxes, .. } = self;
+    #[inline(always)]
+    fn fit_boxes(&mut self, positions: &[Vec3A], is_sane: impl Fn(&Vec3A) -> bool) -> f32 {
+        let Flexible { blas: Blas { nodes, leaves, bounds }, vertices, boxes, .. } = self;
         let mut work = 0.0;
         for (index, node) in nodes.iter_mut().enumerate().rev() {
-            let mut around = NOTHING;
-            for slot in 0..8 {
-                let child = node.child[slot];
-                if child == Node::UNUSED {
+            let mut inside = [NOTHING; 8];
+            for (child, inside) in node.child.iter().zip(&mut inside) {
+                if *child == Node::UNUSED {
                     continue;
                 }
-                let (inside, cost) = if child.is_leaf() {
-                    let packs = &pack_boxes[child.items()];
-                    (packs.iter().copied().fold(NOTHING, union), packs.len() as f32)
-                } else {
-                    (node_boxes[child.node()], 1.0)
+                *inside = match child.is_leaf() {
+                    true => move_leaf(leaves, vertices, *child, positions, &is_sane),
+                    false => boxes[child.node()],
                 };
-                let [low, high] = inside;
-                for axis in 0..3 {
-                    node.bounds[2 * axis][slot] = low[axis];
-                    node.bounds[2 * axis + 1][slot] = high[axis];
-                }
-                work += cost * half_area(inside);
-                around = union(around, inside);
+                work += half_area(*inside);
             }
-            node_boxes[index] = around;
+            boxes[index] = node.fit(&inside);
         }
-        let [low, high] = node_boxes[0];
+        let [low, high] = boxes[0];
         *bounds = low.cmple(high).all().then_some((low, high));
         // A mesh that is a point costs nothing.
-        work / half_area(node_boxes[0]).max(f32::MIN_POSITIVE)
+        work / half_area(boxes[0]).max(f32::MIN_POSITIVE)
     }
-}
-
-/// The box around nothing.
-const NOTHING: [Vec3A; 2] = [Vec3A::INFINITY, Vec3A::NEG_INFINITY];
-
-#[inline(always)]
-fn union(a: [Vec3A; 2], b: [Vec3A; 2]) -> [Vec3A; 2] {
-    [a[0].min(b[0]), a[1].max(b[1])]
-}
-
-#[inline(always)]
-fn half_area([low, high]: [Vec3A; 2]) -> f32 {
-    let d = high - low;
-    d.x * d.y + d.y * d.z + d.z * d.x
 }
 
 /// Whether no vertex is too far away, infinite or NaN: so is the sum, then. It may err on the safe side.
@@ -134,31 +122,32 @@ fn are_all_sane(positions: &[Vec3A]) -> bool {
     sum.cmplt(Vec3A::splat(FARTHEST)).all()
 }
 
-/// The triangle, or a point of it if it is not finite.
-fn sane(corners: [Vec3A; 3]) -> [Vec3A; 3] {
-    let is_sane = |corner: &Vec3A| corner.abs().cmplt(Vec3A::splat(FARTHEST)).all();
-    if corners.iter().all(is_sane) {
-        return corners;
-    }
-    [corners.into_iter().find(is_sane).unwrap_or(Vec3A::ZERO); 3]
+fn is_sane(position: &Vec3A) -> bool {
+    position.abs().cmplt(Vec3A::splat(FARTHEST)).all()
 }
 
-/// Moves the pack's triangles, each as `mend` leaves it; returns the box around them.
+/// Moves a leaf's vertices; returns the box around those that are sane. The others become NaN, so that no ray meets their triangles.
 #[inline(always)]
-fn move_pack(
-    pack: &mut Pack,
-    vertices: &[[u32; 4]; 3],
+fn move_leaf(
+    leaves: &mut [u32],
+    vertices: &[u32],
+    leaf: Child,
     positions: &[Vec3A],
-    mend: impl Fn([Vec3A; 3]) -> [Vec3A; 3],
-) -> [Vec3A; 2] {
-    let lanes: [[Vec3A; 3]; 4] = std::array::from_fn(|lane| {
-        mend(std::array::from_fn(|corner| positions[vertices[corner][lane] as usize]))
-    });
+    is_sane: impl Fn(&Vec3A) -> bool,
+) -> Bounds {
+    let (first, count) = vertices_at(leaves, leaf.place());
     let mut around = NOTHING;
-    for (corner, moved) in pack.vertex.iter_mut().enumerate() {
-        let [a, b, c, d] = std::array::from_fn(|lane| lanes[lane][corner]);
-        *moved = [[a.x, b.x, c.x, d.x], [a.y, b.y, c.y, d.y], [a.z, b.z, c.z, d.z]];
-        around = union(around, [a.min(b).min(c.min(d)), a.max(b).max(c.max(d))]);
+    let words = &mut leaves[first..first + 3 * count];
+    for (k, &vertex) in vertices[first..first + count].iter().enumerate() {
+        let mut position = positions[vertex as usize];
+        if is_sane(&position) {
+            around = union(around, [position; 2]);
+        } else {
+            position = Vec3A::NAN;
+        }
+        for axis in 0..3 {
+            words[axis * count + k] = position[axis].to_bits();
+        }
     }
     around
 }

@@ -12,64 +12,103 @@
 use std::marker::PhantomData;
 
 use frameless_scene::{Geometry, Instance, Mesh, Scene, Target};
-use glam::{Affine3A, Vec3};
+use glam::Affine3A;
 
-use crate::build::{Blas, corners_at, sane_box};
+use crate::build::{Blas, Triangles, corners_at};
 use crate::kernel::{Kernel, ShearRay, SlabRay};
+use crate::leaf::{Corner, Leaf};
 use crate::packet::{Finds, Packet, walk_together};
-use crate::pages::prefer_large_pages;
 use crate::ray::{Hit, Ray};
 use crate::sift::Stops;
-use crate::top::{Placed, first_of, take};
+use crate::top::{Placed, take};
 use crate::traverse::{Leaves, Stack, walk};
 use crate::wide::Child;
 
 /// The instances that stand still, if there are any, and their tree.
 pub(crate) struct Standing {
-    /// Its primitives are indices of `members`.
+    /// Its triangles are numbered through all instances.
     tree: Blas,
-    members: Vec<Member>,
+    numbers: Numbers,
     /// Where each instance of the scene stands; `None`: it is not in the tree.
     places: Vec<Option<Affine3A>>,
 }
 
-/// A triangle of an instance.
-#[derive(Clone, Copy)]
-struct Member {
-    instance: u32,
-    primitive: u32,
+/// Numbers for the triangles of several instances.
+struct Numbers {
+    /// Per instance its first number, and which it is; then one for the end. Ascending.
+    first: Vec<(u32, u32)>,
+    /// Per block of numbers: the place in `first` of the instance that its first number belongs to.
+    places: Vec<u32>,
+}
+
+impl Numbers {
+    const BLOCK: u32 = 256;
+
+    /// For instances with so many triangles each.
+    fn new(counts: impl IntoIterator<Item = (u32, usize)>) -> Numbers {
+        let (mut numbers, mut next) = (Numbers { first: Vec::new(), places: Vec::new() }, 0u32);
+        for (instance, count) in counts.into_iter().filter(|&(_, count)| count > 0) {
+            numbers.first.push((next, instance));
+            next = next.checked_add(count as u32).expect("less than 2³² triangles");
+            let blocks = next.div_ceil(Numbers::BLOCK) as usize;
+            numbers.places.resize(blocks, numbers.first.len() as u32 - 1);
+        }
+        numbers.first.push((next, u32::MAX));
+        numbers
+    }
+
+    /// How many there are.
+    fn count(&self) -> u32 {
+        self.first.last().map_or(0, |&(end, _)| end)
+    }
+
+    /// Which instance and which of its triangles that is.
+    #[inline(always)]
+    fn which(&self, number: u32) -> (u32, u32) {
+        let mut place = self.places[(number / Numbers::BLOCK) as usize] as usize;
+        while self.first[place + 1].0 <= number {
+            place += 1;
+        }
+        let (first, instance) = self.first[place];
+        (instance, number - first)
+    }
+}
+
+/// The triangles of all instances that stand.
+struct All<'a> {
+    scene: &'a Scene,
+    places: &'a [Option<Affine3A>],
+    numbers: &'a Numbers,
+}
+
+impl Triangles for All<'_> {
+    fn count(&self) -> u32 {
+        self.numbers.count()
+    }
+
+    fn corners(&self, triangle: u32) -> [Corner; 3] {
+        let (instance, primitive) = self.numbers.which(triangle);
+        let mesh = mesh_of(self.scene, instance as usize);
+        match (&self.places[instance as usize], mesh) {
+            (Some(place), Some(mesh)) => corners_at(place, mesh, primitive),
+            _ => unreachable!("only meshes that stand have numbers"),
+        }
+    }
 }
 
 impl Standing {
     /// `None` if nothing stands.
     pub(crate) fn new(scene: &Scene) -> Option<Standing> {
         let places = places(scene);
-        let standing = |instance: u32| {
-            let mesh = mesh_of(scene, instance as usize)?;
-            Some((places[instance as usize].as_ref()?, mesh))
-        };
-        let (mut members, mut boxes) = (Vec::new(), Vec::new());
-        for instance in 0..scene.instances.len() as u32 {
-            let Some((place, mesh)) = standing(instance) else { continue };
-            for primitive in 0..mesh.triangles.len() as u32 {
-                if let Some(bounds) = sane_box(&corners_at(place, mesh, primitive)) {
-                    members.push(Member { instance, primitive });
-                    boxes.push(bounds);
-                }
-            }
-        }
         if places.iter().all(Option::is_none) {
             return None;
         }
-        let corners = |member: u32| {
-            let Member { instance, primitive } = members[member as usize];
-            standing(instance)
-                .map_or([Vec3::ZERO; 3], |(place, mesh)| corners_at(place, mesh, primitive))
-        };
-        let all: Vec<u32> = (0..members.len() as u32).collect();
-        let tree = Blas::over(&all, boxes, corners);
-        prefer_large_pages(&members);
-        Some(Standing { tree, members, places })
+        let standing = (0..places.len()).filter(|&instance| places[instance].is_some());
+        let numbers = Numbers::new(standing.filter_map(|instance| {
+            Some((instance as u32, mesh_of(scene, instance)?.triangles.len()))
+        }));
+        let tree = Blas::new(&All { scene, places: &places, numbers: &numbers });
+        Some(Standing { tree, numbers, places })
     }
 
     /// Where an instance of the tree stands.
@@ -98,11 +137,9 @@ impl Standing {
         finds: &mut impl Finds,
         stack: &mut Stack,
     ) -> [u32; 2] {
-        let Blas { nodes, packs, .. } = &self.tree;
-        walk_together::<K>((nodes, packs), packet, finds, stack, |member| {
-            let Member { instance, primitive } = self.members[member as usize];
-            (instance, primitive)
-        })
+        let Blas { nodes, leaves, .. } = &self.tree;
+        let which = |number| self.numbers.which(number);
+        walk_together::<K>((nodes, leaves), packet, finds, stack, which)
     }
 
     /// Whether anything is hit before `best`, which becomes the nearest hit; with `ANY`, whichever is found first.
@@ -116,7 +153,7 @@ impl Standing {
         stack: &mut Stack,
     ) -> bool {
         let (ray, kernel) = (ShearRay::new(ray), PhantomData);
-        let mut leaves = Packs::<K, S, ANY> { standing: self, placed, ray, sieve, kernel };
+        let mut leaves = Meshes::<K, S, ANY> { standing: self, placed, ray, sieve, kernel };
         walk::<K, ANY>(&self.tree.nodes, slab, best, stack, &mut leaves)
     }
 }
@@ -167,7 +204,7 @@ fn mesh_of(scene: &Scene, instance: usize) -> Option<&Mesh> {
 }
 
 /// The leaves.
-struct Packs<'a, K, S, const ANY: bool> {
+struct Meshes<'a, K, S, const ANY: bool> {
     standing: &'a Standing,
     placed: &'a [Placed],
     ray: ShearRay,
@@ -175,36 +212,25 @@ struct Packs<'a, K, S, const ANY: bool> {
     kernel: PhantomData<K>,
 }
 
-impl<K: Kernel, S: Stops, const ANY: bool> Leaves for Packs<'_, K, S, ANY> {
+impl<K: Kernel, S: Stops, const ANY: bool> Leaves for Meshes<'_, K, S, ANY> {
     #[inline(always)]
-    fn fetch(&self, leaf: Child) {
-        K::fetch(&self.standing.tree.packs, first_of(leaf));
+    fn words(&self) -> &[u32] {
+        &self.standing.tree.leaves
     }
 
     #[inline(always)]
     fn visit(&mut self, leaf: Child, best: &mut Hit, _stack: &mut Stack) -> bool {
-        let mut found = false;
-        for pack in &self.standing.tree.packs[leaf.items()] {
-            let lanes = K::triangles(pack, &self.ray, best.t);
-            if lanes.mask == 0 {
-                continue;
-            }
-            let Packs { standing, placed, sieve, .. } = self;
-            found |= take::<ANY>(
-                pack,
+        let Meshes { standing, placed, sieve, .. } = self;
+        let leaf = Leaf::at(&standing.tree.leaves, leaf.place());
+        let lanes = K::triangles(leaf, &self.ray, best.t);
+        lanes.mask != 0
+            && take::<ANY>(
+                leaf,
                 &lanes,
                 best,
-                |member| {
-                    let Member { instance, primitive } = standing.members[member as usize];
-                    (instance, primitive)
-                },
+                |number| standing.numbers.which(number),
                 |hit| !sieve.asks(&placed[hit.instance as usize]) || sieve.stops(hit),
-            );
-            if ANY && found {
-                return true;
-            }
-        }
-        found
+            )
     }
 }
 
@@ -215,10 +241,20 @@ mod tests {
     use frameless::{Request, Size};
     use frameless_scene::builtin;
 
+    use super::Numbers;
     use crate::camera::{Camera, ViewSource};
     use crate::moment::Moment;
     use crate::traverse::Stack;
     use crate::world::World;
+
+    #[test]
+    fn numbers_say_which_triangle_of_which_instance() {
+        let counts = [(3, 700), (4, 0), (7, 1), (8, 1), (9, 255), (12, 1000)];
+        let numbers = Numbers::new(counts);
+        let all = counts.into_iter().flat_map(|(k, count)| (0..count as u32).map(move |p| (k, p)));
+        assert!(all.eq((0..numbers.count()).map(|number| numbers.which(number))));
+        assert_eq!(Numbers::new([]).count(), 0);
+    }
 
     const SIZE: Size = Size { width: 160, height: 120 };
 

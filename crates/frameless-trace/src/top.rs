@@ -1,7 +1,6 @@
 //! Two levels: a tree over the instances, and in each instance's own space its mesh's tree or a sphere.
 
 use std::marker::PhantomData;
-use std::ops::Range;
 use std::sync::OnceLock;
 
 use glam::{Affine3A, Vec3A};
@@ -9,11 +8,13 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
-use crate::build::{Blas, binary_by_median};
+use crate::build::{Blas, halve};
+use crate::collapse::Collapse;
 use crate::deforming::Deforming;
 #[cfg(target_arch = "x86_64")]
 use crate::kernel::avx2;
-use crate::kernel::{Isa, Kernel, Lanes, Pack, Portable, ShearRay, SlabRay};
+use crate::kernel::{Isa, Kernel, Lanes, Portable, ShearRay, SlabRay};
+use crate::leaf::Leaf;
 use crate::packet::{Any, Nearest, Packet, TOGETHER};
 use crate::ray::{Hit, Ray};
 use crate::sift::{NoSieve, Stops};
@@ -21,7 +22,7 @@ use crate::sphere;
 use crate::standing::Standing;
 use crate::traverse::{Leaves, STACK_PER_TREE, Stack, walk};
 use crate::untied::Ploc;
-use crate::wide::{Child, Node, collapse};
+use crate::wide::{Child, Node};
 
 /// What stands in an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -136,19 +137,36 @@ pub(crate) struct Top {
     boxes: Vec<Aabb>,
     /// Which instance each box is of.
     instances: Vec<u32>,
-    /// The same instances in the order of the leaves.
-    pub(crate) leaves: Vec<u32>,
     binary: Bvh2,
     builder: PlocBuilder,
+    collapse: Collapse,
 }
 
 impl Top {
     pub(crate) fn new() -> Top {
-        let mut nodes = Vec::new();
-        collapse(&Bvh2::zeroed(0), &mut nodes, |_| Child::ROOT);
-        let (boxes, instances, leaves) = (Vec::new(), Vec::new(), Vec::new());
-        let (binary, builder) = (Bvh2::zeroed(0), PlocBuilder::new());
-        Top { nodes, boxes, instances, leaves, binary, builder }
+        Top {
+            nodes: Vec::new(),
+            boxes: Vec::new(),
+            instances: Vec::new(),
+            binary: Bvh2::zeroed(0),
+            builder: PlocBuilder::new(),
+            collapse: Collapse::default(),
+        }
+    }
+
+    /// Whether there is nothing to be hit.
+    #[inline(always)]
+    pub(crate) fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// Whether any of the packet's rays may meet an instance.
+    #[inline(always)]
+    fn may_be_met<K: Kernel>(&self, packet: &Packet) -> bool {
+        match self.nodes.first() {
+            Some(root) => packet.may_meet::<K>(root),
+            None => false,
+        }
     }
 
     /// Build from scratch: a few µs for a hundred instances. Those of `standing` are left out.
@@ -171,19 +189,20 @@ impl Top {
         }
         PLOC.build(&mut self.builder, &self.boxes, &mut self.binary);
         if self.take() > STACK_PER_TREE {
-            self.binary = binary_by_median(&self.boxes);
+            self.binary = halve(&self.boxes);
             self.take();
         }
     }
 
     fn take(&mut self) -> usize {
-        let Top { nodes, instances, leaves, binary, .. } = self;
-        leaves.clear();
-        collapse(binary, nodes, |members| {
-            let first = leaves.len();
-            leaves.extend(members.iter().map(|&member| instances[member as usize]));
-            Child::leaf(first, members.len())
-        })
+        let Top { nodes, instances, binary, collapse, .. } = self;
+        nodes.clear();
+        if instances.is_empty() {
+            return 0;
+        }
+        collapse.plan(binary, 1.0, |_| false);
+        collapse
+            .make_root(binary, nodes, |boxes| Child::leaf(instances[boxes[0] as usize] as usize))
     }
 }
 
@@ -291,7 +310,7 @@ impl Group<'_> {
             let met = tree.walk_together::<K>(&mut packet, &mut Nearest(&mut best), stack);
             stack.worth[0].learn(met);
             standing = None;
-            is_done = !packet.may_meet::<K>(&targets.top.nodes[0]);
+            is_done = !targets.top.may_be_met::<K>(&packet);
         }
         let targets = &Targets { standing, ..*targets };
         for ((ray, found), none) in rays.iter().zip(found).zip(best) {
@@ -336,7 +355,7 @@ impl Shadows<'_> {
             stack.worth[1].learn(met);
             known.blocked = any.blocked;
             known.passed = !(any.blocked | any.doubtful);
-            known.is_all = !packet.may_meet::<K>(&targets.top.nodes[0]);
+            known.is_all = !targets.top.may_be_met::<K>(&packet);
         }
         known
     }
@@ -377,7 +396,7 @@ impl<S: Stops, const ANY: bool> Walk<'_, S, ANY> {
                 return Some(best);
             }
         }
-        if !targets.top.leaves.is_empty() {
+        if !targets.top.is_empty() {
             let mut instances = Instances::<K, S, ANY> { targets, ray, sieve, kernel: PhantomData };
             walk::<K, ANY>(&targets.top.nodes, &slab, &mut best, stack, &mut instances);
         }
@@ -395,37 +414,33 @@ struct Instances<'a, K, S, const ANY: bool> {
 
 impl<K: Kernel, S: Stops, const ANY: bool> Leaves for Instances<'_, K, S, ANY> {
     #[inline(always)]
-    fn fetch(&self, _leaf: Child) {}
+    fn words(&self) -> &[u32] {
+        &[]
+    }
 
     #[inline(always)]
     fn visit(&mut self, leaf: Child, best: &mut Hit, stack: &mut Stack) -> bool {
-        let mut found = false;
-        for &instance in &self.targets.top.leaves[leaf.items()] {
-            let placed = &self.targets.placed[instance as usize];
-            // Not normalised, so that t means the same here and in the world.
-            let ray = self.ray.transformed(&placed.tree_from_world);
-            found |= match self.targets.trees.of(placed.shape) {
-                None => meet_sphere(&ray, instance, best),
-                Some(blas) if ray.is_traceable() => {
-                    let asks = self.sieve.asks(placed);
-                    let (shear, sieve) = (ShearRay::new(&ray), &mut self.sieve);
-                    let mut triangles = Triangles::<K, S, ANY> {
-                        packs: &blas.packs,
-                        ray: shear,
-                        instance,
-                        asks,
-                        sieve,
-                        kernel: PhantomData,
-                    };
-                    walk::<K, ANY>(&blas.nodes, &SlabRay::new(&ray), best, stack, &mut triangles)
-                }
-                Some(_) => false,
-            };
-            if ANY && found {
-                return true;
+        let instance = leaf.place() as u32;
+        let placed = &self.targets.placed[instance as usize];
+        // Not normalised, so that t means the same here and in the world.
+        let ray = self.ray.transformed(&placed.tree_from_world);
+        match self.targets.trees.of(placed.shape) {
+            None => meet_sphere(&ray, instance, best),
+            Some(blas) if ray.is_traceable() => {
+                let asks = self.sieve.asks(placed);
+                let (shear, sieve) = (ShearRay::new(&ray), &mut self.sieve);
+                let mut triangles = Triangles::<K, S, ANY> {
+                    leaves: &blas.leaves,
+                    ray: shear,
+                    instance,
+                    asks,
+                    sieve,
+                    kernel: PhantomData,
+                };
+                walk::<K, ANY>(&blas.nodes, &SlabRay::new(&ray), best, stack, &mut triangles)
             }
+            Some(_) => false,
         }
-        found
     }
 }
 
@@ -441,7 +456,7 @@ fn meet_sphere(ray: &Ray, instance: u32, best: &mut Hit) -> bool {
 
 /// The bottom level's leaves.
 struct Triangles<'a, K, S, const ANY: bool> {
-    packs: &'a [Pack],
+    leaves: &'a [u32],
     ray: ShearRay,
     instance: u32,
     asks: bool,
@@ -451,56 +466,36 @@ struct Triangles<'a, K, S, const ANY: bool> {
 
 impl<K: Kernel, S: Stops, const ANY: bool> Leaves for Triangles<'_, K, S, ANY> {
     #[inline(always)]
-    fn fetch(&self, leaf: Child) {
-        K::fetch(self.packs, first_of(leaf));
+    fn words(&self) -> &[u32] {
+        self.leaves
     }
 
     #[inline(always)]
     fn visit(&mut self, leaf: Child, best: &mut Hit, _stack: &mut Stack) -> bool {
-        let mut found = false;
-        for pack in &self.packs[leaf.items()] {
-            let lanes = K::triangles(pack, &self.ray, best.t);
-            if lanes.mask == 0 {
-                continue;
-            }
-            let (instance, asks) = (self.instance, self.asks);
-            let place = |primitive| (instance, primitive);
-            found |= take::<ANY>(pack, &lanes, best, place, |hit| !asks || self.sieve.stops(hit));
-            if ANY && found {
-                return true;
-            }
-        }
-        found
+        let leaf = Leaf::at(self.leaves, leaf.place());
+        let lanes = K::triangles(leaf, &self.ray, best.t);
+        let Triangles { instance, asks, sieve, .. } = self;
+        let place = |primitive| (*instance, primitive);
+        lanes.mask != 0 && take::<ANY>(leaf, &lanes, best, place, |hit| !*asks || sieve.stops(hit))
     }
 }
 
-/// A leaf's first item: the others are mostly not there, or follow by themselves.
-#[inline(always)]
-pub(crate) fn first_of(leaf: Child) -> Range<usize> {
-    let first = leaf.items().start;
-    first..first + 1
-}
-
-/// Takes the best of a pack's hits, of those that `stops` says are hits. Whether there was one. `place`: instance and triangle of what is in
-/// the pack.
+/// Takes the best of a leaf's hits, of those that `stops` says are hits. Whether there was one. `place`: instance and triangle of what is in
+/// the leaf.
 #[inline(always)]
 pub(crate) fn take<const ANY: bool>(
-    pack: &Pack,
+    leaf: Leaf<'_>,
     lanes: &Lanes,
     best: &mut Hit,
     place: impl Fn(u32) -> (u32, u32),
     mut stops: impl FnMut(&Hit) -> bool,
 ) -> bool {
-    let (mut found, mut last) = (false, None);
+    let mut found = false;
     let mut mask = lanes.mask;
     while mask != 0 {
         let lane = mask.trailing_zeros() as usize & 3;
         mask &= mask - 1;
-        // Unused lanes repeat the last used one, which is to be asked about once.
-        if last.replace(pack.primitive[lane]) == Some(pack.primitive[lane]) {
-            continue;
-        }
-        let (instance, primitive) = place(pack.primitive[lane]);
+        let (instance, primitive) = place(leaf.triangle(lane));
         let barycentric = [lanes.v[lane], lanes.w[lane]];
         let hit = Hit { t: lanes.t[lane], barycentric, primitive, instance };
         if hit.is_before(best) && stops(&hit) {

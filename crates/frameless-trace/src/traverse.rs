@@ -5,7 +5,7 @@ use crate::packet::Worth;
 use crate::ray::Hit;
 use crate::wide::{Child, Node};
 
-/// Entries that one tree's traversal may put on the stack. A tree balanced by median splits of 2²⁹ leaves needs
+/// Entries that one tree's traversal may put on the stack. A tree balanced by median splits of 2²⁷ leaves needs
 /// 7 per binary level: 7 · 27 = 189.
 pub(crate) const STACK_PER_TREE: usize = 192;
 
@@ -115,8 +115,8 @@ pub(crate) trait Leaves {
     /// Tests a leaf's items; a hit before `best` takes its place. Whether there was one.
     fn visit(&mut self, leaf: Child, best: &mut Hit, stack: &mut Stack) -> bool;
 
-    /// Tells the memory that a leaf will be visited soon.
-    fn fetch(&self, leaf: Child);
+    /// Where they are, in words as [`Child::place`] counts them; what is elsewhere may be told anywhere.
+    fn words(&self) -> &[u32];
 }
 
 /// Whether anything is hit before `best`, which becomes the nearest hit; with `ANY`, the first one found.
@@ -133,6 +133,8 @@ pub(crate) fn walk<K: Kernel, const ANY: bool>(
     let mut found = false;
     loop {
         if current.is_leaf() {
+            // What its second line holds is wanted at once, but found only by the first.
+            K::fetch(leaves.words().as_ptr().wrapping_add(current.place()).cast());
             if leaves.visit(current, best, stack) {
                 found = true;
                 if ANY {
@@ -141,12 +143,9 @@ pub(crate) fn walk<K: Kernel, const ANY: bool>(
                 }
             }
         } else {
-            let fetch = |child: Child| match child.is_leaf() {
-                true => leaves.fetch(child),
-                false => K::fetch(nodes, child.node()..child.node() + 1),
-            };
             let node = &nodes[current.node()];
-            if let Some(nearest) = descend::<K, ANY>(node, ray, best.t, stack, fetch) {
+            let places = [nodes.as_ptr().cast(), leaves.words().as_ptr().cast()];
+            if let Some(nearest) = descend::<K, ANY>(node, ray, best.t, stack, places) {
                 current = nearest;
                 continue;
             }
@@ -171,30 +170,35 @@ fn descend<K: Kernel, const ANY: bool>(
     ray: &SlabRay,
     t_max: f32,
     stack: &mut Stack,
-    fetch: impl Fn(Child),
+    places: [*const u8; 2],
 ) -> Option<Child> {
-    let (mut mask, entries) = K::boxes(node, ray, t_max);
+    let (mut mask, near) = K::boxes(node, ray, t_max);
     let mut waiting = mask.count_ones();
     if waiting <= 1 {
         let slot = mask.trailing_zeros() as usize;
-        return (waiting == 1).then(|| entries[slot & 7].child());
+        return (waiting == 1).then(|| node.child[slot & 7]);
     }
     // Memory is slow and several children wait: it can begin with all of them.
+    if ANY {
+        // Any order finds whether there is a hit; sorting would only cost.
+        loop {
+            let child = node.child[mask.trailing_zeros() as usize & 7];
+            mask &= mask.wrapping_sub(1);
+            if mask == 0 {
+                return Some(child);
+            }
+            K::fetch(place_of(child, places));
+            stack.push(Entry::new(child, 0.0));
+        }
+    }
+    let entries = K::entries(node, near);
     let mut next = || {
         let slot = mask.trailing_zeros() as usize;
         mask &= mask.wrapping_sub(1);
-        fetch(entries[slot & 7].child());
+        K::fetch(place_of(entries[slot & 7].child(), places));
         entries[slot & 7]
     };
     let first = next();
-    if ANY {
-        // Any order finds whether there is a hit; sorting would only cost.
-        while waiting > 1 {
-            stack.push(next());
-            waiting -= 1;
-        }
-        return Some(first.child());
-    }
     let second = next();
     let (nearer, farther) = (first.min(second), first.max(second));
     if waiting == 2 {
@@ -217,3 +221,14 @@ fn descend<K: Kernel, const ANY: bool>(
     }
     Some(stack.pop().child())
 }
+
+/// Where a child is, of nodes and leaves that begin at `places`. Which of them it is cannot be predicted; so nothing branches on it.
+#[inline(always)]
+fn place_of(child: Child, places: [*const u8; 2]) -> *const u8 {
+    const NODE: u32 = size_of::<Node>().trailing_zeros();
+    const WORD: u32 = size_of::<u32>().trailing_zeros();
+    let is_leaf = usize::from(child.is_leaf());
+    places[is_leaf].wrapping_add(child.place() << (NODE - (NODE - WORD) * is_leaf as u32))
+}
+
+const _: () = assert!(size_of::<Node>().is_power_of_two());

@@ -1,41 +1,176 @@
-//! The 8-wide bounding volume hierarchy: a binary one collapsed so that one vector instruction tests eight children.
+//! A node of the 8-wide bounding volume hierarchy: small, so that a tree of a million triangles stays in the caches.
+//!
+//! Boxes are stored in steps from the low corner o of the box around all eight children (Ylitie, Karras & Laine 2017, "Efficient
+//! Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", §3.2):
+//!
+//! ```text
+//! plane = o + q s        q: 0 to 255; s: per axis, a little more than a 255th of the way to the far side
+//! ```
+//!
+//! Every box is stored [`ROOM`] steps larger than it is at least, for what a ray loses by rounding on its way to it.
 
-use obvhs::bvh2::Bvh2;
+use glam::Vec3A;
 
-/// Eight children: their boxes and where they are.
-///
-/// Rows of `bounds`: low x, high x, low y, high y, low z, high z. An unused slot has an inside-out box, which no ray meets.
+/// Eight children: their boxes and where they are. Two lines of the cache.
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Node {
-    pub(crate) bounds: [[f32; 8]; 6],
     pub(crate) child: [Child; 8],
+    /// q, in rows: low x, high x, low y, high y, low z, high z.
+    counts: [[u8; 8]; 6],
+    /// o; the fourth number is 0, as of the steps.
+    origin: [f32; 4],
+    step: [f32; 4],
+    /// Bit i: slot i has a child.
+    used: u32,
+}
+
+/// A ray with origin a and reciprocal direction r meets a plane at q (s r) + (o − a) r. Four roundings, 2⁻²⁴ each, of these two parts make
+/// it as wrong as a plane 4 · 2⁻²⁴ (q s + |o − a|) away, and |o − a| is at most |plane − a| + q s. Of that, 4 · 2⁻²⁴ |plane − a| is a part of
+/// the distance, for which [`crate::kernel::SLAB_MARGIN`] makes room, and the rest at most 8 · 2⁻²⁴ · 255 s = 1.3e-4 s.
+const ROOM: f32 = 1.0 / 4096.0;
+
+/// Far below what a mesh's details are, and far enough above 1.2e-38: products with less are denormal, which makes every visit several times
+/// as long.
+const LEAST_STEP: f32 = 1e-30;
+
+/// A box as its low and its high corner.
+pub(crate) type Bounds = [Vec3A; 2];
+
+/// The box around nothing.
+pub(crate) const NOTHING: Bounds = [Vec3A::INFINITY, Vec3A::NEG_INFINITY];
+
+/// The box around both.
+#[inline(always)]
+pub(crate) fn union(a: Bounds, b: Bounds) -> Bounds {
+    [a[0].min(b[0]), a[1].max(b[1])]
+}
+
+/// Half the surface; 0 of nothing.
+#[inline(always)]
+pub(crate) fn half_area([low, high]: Bounds) -> f32 {
+    let d = (high - low).max(Vec3A::ZERO);
+    d.x * d.y + d.y * d.z + d.z * d.x
 }
 
 impl Node {
-    const EMPTY: Node = {
-        let (low, high) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
-        Node { bounds: [low, high, low, high, low, high], child: [Node::UNUSED; 8] }
+    /// A node without children.
+    pub(crate) const EMPTY: Node = Node {
+        origin: [0.0; 4],
+        step: [LEAST_STEP, LEAST_STEP, LEAST_STEP, 0.0],
+        used: 0,
+        counts: [[0; 8]; 6],
+        child: [Node::UNUSED; 8],
     };
     /// The child of a slot without one.
     pub(crate) const UNUSED: Child = Child(u32::MAX);
+
+    pub(crate) fn new(children: &[(Bounds, Child)]) -> Node {
+        let (mut node, mut boxes) = (Node::EMPTY, [NOTHING; 8]);
+        for (slot, (bounds, child)) in children.iter().enumerate() {
+            node.child[slot] = *child;
+            boxes[slot] = *bounds;
+        }
+        node.fit(&boxes);
+        node
+    }
+
+    /// Gives each child this box; [`NOTHING`] is where no ray goes, or a point. Returns the box around all.
+    pub(crate) fn fit(&mut self, boxes: &[Bounds; 8]) -> Bounds {
+        let around = boxes.iter().copied().fold(NOTHING, union);
+        self.used = (0..8).map(|slot| u32::from(self.child[slot] != Node::UNUSED) << slot).sum();
+        for axis in 0..3 {
+            /// With room on both sides, and for rounding.
+            const STEPS: f32 = 255.0 - 8.0 * ROOM;
+            let [low, high] = match around[0].is_finite() {
+                true => around.map(|corner| corner[axis]),
+                false => [0.0; 2],
+            };
+            let step = ((high - low.next_down()) / STEPS).max(LEAST_STEP);
+            let reciprocal = 1.0 / step;
+            self.step[axis] = step;
+            // Rounding must not take away the room below.
+            self.origin[axis] = (low - 2.0 * ROOM * step).min(low.next_down());
+            let [low, high] = [0, 1].map(|side| {
+                let planes: [f32; 8] = std::array::from_fn(|slot| boxes[slot][side][axis]);
+                planes.map(|plane| (plane - self.origin[axis]) * reciprocal)
+            });
+            // Casts go to the nearest number that there is, and to 0 from NaN.
+            self.counts[2 * axis] = low.map(|x| (x - ROOM) as u8);
+            self.counts[2 * axis + 1] = high.map(|x| {
+                let x = x + ROOM;
+                let whole = x as i32;
+                (whole + i32::from(x > whole as f32)) as u8
+            });
+        }
+        around
+    }
+
+    /// The plane of a child's box, in rows: low x, high x, low y, high y, low z, high z.
+    #[inline(always)]
+    pub(crate) fn plane(&self, row: usize, slot: usize) -> f32 {
+        let axis = row / 2 % 3;
+        self.origin[axis] + f32::from(self.counts[row % 6][slot % 8]) * self.step[axis]
+    }
+
+    /// Bit i: slot i has a child.
+    #[inline(always)]
+    pub(crate) fn used(&self) -> u32 {
+        self.used
+    }
+
+    /// o.
+    #[inline(always)]
+    pub(crate) fn origin(&self) -> &[f32; 4] {
+        &self.origin
+    }
+
+    /// s.
+    #[inline(always)]
+    pub(crate) fn step(&self) -> &[f32; 4] {
+        &self.step
+    }
+
+    /// q of each child, in rows as for [`Node::plane`].
+    #[inline(always)]
+    pub(crate) fn counts(&self, row: usize) -> &[u8; 8] {
+        &self.counts[row % 6]
+    }
+
+    /// The same where what is below lies farther behind: its nodes and its leaves.
+    pub(crate) fn moved(mut self, nodes: usize, leaves: usize) -> Node {
+        for child in self.child.iter_mut().filter(|child| **child != Node::UNUSED) {
+            *child = child.moved(nodes, leaves);
+        }
+        self
+    }
 }
 
-/// An inner node's index, or a leaf: bit 31 set, then 2 bits of length − 1, then 29 bits of index.
+/// An inner node's index, or, with bit 31 set, where a leaf is.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Child(u32);
 
 impl Child {
     const LEAF: u32 = 1 << 31;
-    const INDEX_BITS: u32 = 29;
-    const INDEX: u32 = (1 << Self::INDEX_BITS) - 1;
     pub(crate) const ROOT: Child = Child(0);
 
-    pub(crate) fn leaf(first: usize, length: usize) -> Child {
-        assert!((1..=4).contains(&length), "a leaf holds 1 to 4 items, not {length}");
-        assert!(first <= Self::INDEX as usize, "more than 2²⁹ leaf items");
-        Child(Self::LEAF | (length as u32 - 1) << Self::INDEX_BITS | first as u32)
+    pub(crate) fn leaf(place: usize) -> Child {
+        assert!(place < (Self::LEAF - 1) as usize, "leaves beyond 2³¹");
+        Child(Self::LEAF | place as u32)
+    }
+
+    pub(crate) fn inner(node: usize) -> Child {
+        assert!(node < Self::LEAF as usize, "nodes beyond 2³¹");
+        Child(node as u32)
+    }
+
+    /// The same where nodes and leaves lie farther behind.
+    pub(crate) fn moved(self, nodes: usize, leaves: usize) -> Child {
+        match self.is_leaf() {
+            true => Child::leaf(self.place() + leaves),
+            false => Child::inner(self.node() + nodes),
+        }
     }
 
     #[inline(always)]
@@ -60,73 +195,56 @@ impl Child {
         self.0 as usize
     }
 
-    /// Items of a leaf.
+    /// Where a leaf is.
     #[inline(always)]
-    pub(crate) fn items(self) -> std::ops::Range<usize> {
-        let first = (self.0 & Self::INDEX) as usize;
-        first..first + (self.0 >> Self::INDEX_BITS & 3) as usize + 1
+    pub(crate) fn place(self) -> usize {
+        (self.0 & !Self::LEAF) as usize
     }
 }
 
-/// Collapse `binary` into `nodes` (cleared first; its first node is the root). `leaf` is told a leaf's
-/// primitives and says how to refer to them.
-///
-/// Starting from a node's two children, the inner node with the largest surface is replaced by its own children until
-/// there are eight (Wald et al. 2008, "Getting Rid of Packets", §3.1): the surface is the probability of a visit.
-///
-/// Returns how many entries a traversal's stack can ever need.
-pub(crate) fn collapse(
-    binary: &Bvh2,
-    nodes: &mut Vec<Node>,
-    mut leaf: impl FnMut(&[u32]) -> Child,
-) -> usize {
-    nodes.clear();
-    nodes.push(Node::EMPTY);
-    if binary.nodes.is_empty() {
-        return 0;
-    }
-    let mut stack_need = 0;
-    // Binary node, wide node it becomes, entries on the stack when a traversal comes here.
-    let mut work = vec![(0usize, 0usize, 0usize)];
-    let mut members = Vec::with_capacity(8);
-    while let Some((from, to, waiting)) = work.pop() {
-        gather(binary, from, &mut members);
-        let waiting = waiting + members.len() - 1;
-        stack_need = stack_need.max(waiting);
-        let mut node = Node::EMPTY;
-        for (slot, &member) in members.iter().enumerate() {
-            let source = &binary.nodes[member];
-            let (low, high) = (source.aabb().min, source.aabb().max);
-            for axis in 0..3 {
-                node.bounds[2 * axis][slot] = low[axis];
-                node.bounds[2 * axis + 1][slot] = high[axis];
-            }
-            node.child[slot] = if source.is_leaf() {
-                let first = source.first_index as usize;
-                leaf(&binary.primitive_indices[first..first + source.prim_count as usize])
-            } else {
-                nodes.push(Node::EMPTY);
-                work.push((member, nodes.len() - 1, waiting));
-                Child((nodes.len() - 1) as u32)
+#[cfg(test)]
+mod tests {
+    use frameless::Rng;
+
+    use super::*;
+
+    /// Boxes of all sizes, flat ones, and some so far away that there are few floats left.
+    #[test]
+    fn boxes_are_inside_what_is_stored_of_them_and_not_much_smaller() {
+        let mut rng = Rng::new(3);
+        for round in 0..10_000 {
+            let size = 10f32.powi(rng.below(30) as i32 - 20);
+            let far = if round % 2 == 0 { 0.0 } else { size * 10f32.powi(rng.below(9) as i32) };
+            let mut point = || {
+                Vec3A::from_array(std::array::from_fn(|axis| match (round + axis) % 7 {
+                    0 => far,
+                    _ => far + size * rng.unit_f32(),
+                }))
             };
+            let boxes: [Bounds; 8] = std::array::from_fn(|_| {
+                let [a, b] = [point(), point()];
+                [a.min(b), a.max(b)]
+            });
+            let node = Node::new(&boxes.map(|bounds| (bounds, Child::ROOT)));
+            let [low, high] = boxes.into_iter().fold(NOTHING, union);
+            for (slot, axis) in (0..8).flat_map(|slot| (0..3).map(move |axis| (slot, axis))) {
+                let [least, most] = boxes[slot].map(|corner| corner[axis]);
+                let stored = [node.plane(2 * axis, slot), node.plane(2 * axis + 1, slot)];
+                assert!(stored[0] <= least && most <= stored[1], "{stored:?} {least} {most}");
+                let close =
+                    (high - low)[axis] * (1.1 / 255.0) + 4.0 * f32::EPSILON * far.max(1e-20);
+                assert!(least - stored[0] <= close && stored[1] - most <= close);
+            }
         }
-        nodes[to] = node;
     }
-    stack_need
-}
 
-/// The up to eight descendants of `from` that become one wide node's children.
-fn gather(binary: &Bvh2, from: usize, members: &mut Vec<usize>) {
-    members.clear();
-    members.push(from);
-    while members.len() < 8 {
-        let area = |&member: &usize| binary.nodes[member].aabb().half_area();
-        let widest = (0..members.len())
-            .filter(|&k| !binary.nodes[members[k]].is_leaf())
-            .max_by(|&a, &b| area(&members[a]).total_cmp(&area(&members[b])));
-        let Some(widest) = widest else { break };
-        let first = binary.nodes[members[widest]].first_index as usize;
-        members[widest] = first;
-        members.push(first + 1);
+    #[test]
+    fn a_child_without_a_box_leaves_the_others_theirs() {
+        let bounds = [Vec3A::ONE, Vec3A::splat(2.0)];
+        let node = Node::new(&[(NOTHING, Child::ROOT), (bounds, Child::ROOT)]);
+        assert_eq!(node.used(), 0b11);
+        assert!(node.plane(0, 1) <= 1.0 && node.plane(0, 1) > 0.99);
+        let nowhere = Node::new(&[(NOTHING, Child::ROOT)]);
+        assert!((0..6).all(|row| nowhere.plane(row, 0).abs() < 1e-27));
     }
 }

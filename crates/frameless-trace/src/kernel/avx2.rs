@@ -2,15 +2,18 @@
 //!
 //! SAFETY, once for all: every intrinsic needs the processor to have AVX2. The methods of [`Avx2`] are reached only from
 //! [`with`], whose caller holds a [`Detected`], and only [`Detected::new`] makes one, after asking the processor. Loads read
-//! whole rows of `Node` (aligned to 64, rows of 32 bytes, the last of which is its children, 4 bytes each) and `Pack` (aligned to 16, rows of 16 bytes), inside the arrays; eight
-//! [`Entry`] are eight numbers of 64 bits.
+//! whole rows of [`Node`] (8 bytes; and its children, 4 bytes each, aligned to 32) and, of the [`LONGEST`] words of a [`Leaf`], the first and
+//! the 32 bits from byte 2 on, and eight numbers from x, y and z of its first vertex on: at most from word 6 + 2 · 8 on, by how its methods
+//! mask what they read. Eight [`Entry`] are eight numbers of 64 bits.
 //! The methods are `inline(always)` so that they end up inside [`with`], where these instructions may be emitted.
 #![allow(unsafe_code)]
 
 use std::arch::x86_64::*;
-use std::ops::Range;
 
-use super::{Eight, Kernel, Lanes, Pack, Portable, SLAB_MARGIN, ShearRay, SlabRay};
+use super::{Eight, Kernel, Lanes, Portable, SLAB_MARGIN_ULPS, ShearRay, SlabRay};
+#[cfg(doc)]
+use crate::leaf::LONGEST;
+use crate::leaf::Leaf;
 use crate::traverse::Entry;
 use crate::wide::Node;
 
@@ -21,6 +24,7 @@ pub(crate) struct Detected(());
 impl Detected {
     pub(crate) fn new() -> Option<Detected> {
         (is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
             && is_x86_feature_detected!("bmi1")
             && is_x86_feature_detected!("popcnt"))
         .then_some(Detected(()))
@@ -37,7 +41,7 @@ pub(crate) trait Task {
 /// Run a task with AVX2 code.
 #[inline]
 pub(crate) fn with<T: Task>(_proof: Detected, task: T) -> T::Output {
-    #[target_feature(enable = "avx2,bmi1,popcnt")]
+    #[target_feature(enable = "avx2,fma,bmi1,popcnt")]
     fn run<T: Task>(task: T) -> T::Output {
         task.run()
     }
@@ -109,75 +113,92 @@ impl Kernel for Avx2 {
     type Eight = Avx2Eight;
 
     #[inline(always)]
-    fn boxes(node: &Node, ray: &SlabRay, t_max: f32) -> (u32, [Entry; 8]) {
+    fn boxes(node: &Node, ray: &SlabRay, t_max: f32) -> (u32, Avx2Eight) {
         // SAFETY: see the module.
         unsafe {
-            let plane = |axis: usize, far: usize| {
-                // Masked, so that the compiler knows that the row is there.
-                let row = &node.bounds[2 * axis + ((ray.entry[axis] ^ far) & 1)];
-                let from_origin =
-                    _mm256_sub_ps(_mm256_load_ps(row.as_ptr()), _mm256_set1_ps(ray.origin[axis]));
-                _mm256_mul_ps(from_origin, _mm256_set1_ps(ray.reciprocal[axis]))
-            };
+            let reciprocal = ray.reciprocal.into();
+            let step = _mm_mul_ps(_mm_loadu_ps(node.step().as_ptr()), reciprocal);
+            let origin = _mm_loadu_ps(node.origin().as_ptr());
+            let first = _mm_mul_ps(_mm_sub_ps(origin, ray.origin.into()), reciprocal);
             let (mut near, mut far) = (_mm256_setzero_ps(), _mm256_set1_ps(t_max));
             for axis in 0..3 {
-                near = _mm256_max_ps(plane(axis, 0), near);
-                far = _mm256_min_ps(plane(axis, 1), far);
+                let (step, first) = (splat_axis(step, axis), splat_axis(first, axis));
+                // Masked, so that the compiler knows that the rows are there.
+                let enters = counts(node, 2 * axis + (ray.entry[axis] & 1));
+                let leaves = counts(node, 2 * axis + (ray.entry[axis] & 1 ^ 1));
+                near = _mm256_max_ps(_mm256_fmadd_ps(enters, step, first), near);
+                far = _mm256_min_ps(_mm256_fmadd_ps(leaves, step, first), far);
             }
-            let far = _mm256_mul_ps(far, _mm256_set1_ps(SLAB_MARGIN));
-            let mask = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(near, far)) as u32;
+            let [near_bits, far_bits] = [near, far].map(|t| _mm256_castps_si256(t));
+            let far_bits = _mm256_add_epi32(far_bits, _mm256_set1_epi32(SLAB_MARGIN_ULPS));
+            let meets = _mm256_castsi256_ps(_mm256_cmpgt_epi32(far_bits, near_bits));
+            (_mm256_movemask_ps(meets) as u32 & node.used(), Avx2Eight(near))
+        }
+    }
+
+    #[inline(always)]
+    fn entries(node: &Node, near: Avx2Eight) -> [Entry; 8] {
+        // SAFETY: see the module.
+        unsafe {
             // Pairs of slots in the order 0 2 1 3, so that interleaving within halves gives all in order.
-            let in_halves = |row| _mm256_permute4x64_epi64::<0b11_01_10_00>(row);
-            let child = in_halves(_mm256_load_si256(node.child.as_ptr().cast()));
-            let near = in_halves(_mm256_castps_si256(near));
+            const IN_HALVES: i32 = 0b11_01_10_00;
+            let child = _mm256_load_si256(node.child.as_ptr().cast());
+            let child = _mm256_permute4x64_epi64::<IN_HALVES>(child);
+            let near = _mm256_permute4x64_epi64::<IN_HALVES>(_mm256_castps_si256(near.0));
             let mut entries = [Entry::ROOT; 8];
             let to = entries.as_mut_ptr().cast::<__m256i>();
             _mm256_storeu_si256(to, _mm256_unpacklo_epi32(child, near));
             _mm256_storeu_si256(to.add(1), _mm256_unpackhi_epi32(child, near));
-            (mask, entries)
+            entries
         }
     }
 
     #[inline(always)]
-    fn fetch<T>(items: &[T], range: Range<usize>) {
+    fn planes(node: &Node, row: usize) -> Avx2Eight {
+        // SAFETY: see the module.
+        Avx2Eight(unsafe {
+            let axis = row / 2 % 3;
+            let step = _mm256_set1_ps(node.step()[axis]);
+            let from_origin = _mm256_mul_ps(counts(node, row), step);
+            _mm256_add_ps(_mm256_set1_ps(node.origin()[axis]), from_origin)
+        })
+    }
+
+    #[inline(always)]
+    fn fetch(place: *const u8) {
         /// Bytes that come at once.
         const LINE: usize = 64;
-        let first = items.as_ptr().wrapping_add(range.start).cast::<i8>();
-        for line in 0..(range.len() * size_of::<T>()).div_ceil(LINE) {
-            // SAFETY: see the module; a hint about any address is harmless.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>(first.wrapping_add(line * LINE)) };
+        // SAFETY: see the module; a hint about any address is harmless.
+        unsafe {
+            _mm_prefetch::<_MM_HINT_T0>(place.cast());
+            _mm_prefetch::<_MM_HINT_T0>(place.wrapping_add(LINE).cast());
         }
     }
 
+    /// Vertices are sheared once each, eight at a time; then every triangle picks its corners.
     #[inline(always)]
-    fn triangles(pack: &Pack, ray: &ShearRay, t_max: f32) -> Lanes {
+    fn triangles(leaf: Leaf<'_>, ray: &ShearRay, t_max: f32) -> Lanes {
         let [kx, ky, kz] = ray.axes;
         // SAFETY: see the module.
         unsafe {
-            let [sx, sy, sz] = ray.shear.map(|s| _mm_set1_ps(s));
-            let sheared = |corner: usize| {
-                let from_origin = |axis: usize| {
-                    let row = _mm_load_ps(pack.vertex[corner][axis].as_ptr());
-                    _mm_sub_ps(row, _mm_set1_ps(ray.origin[axis]))
-                };
-                let z = from_origin(kz);
-                (
-                    _mm_sub_ps(from_origin(kx), _mm_mul_ps(sx, z)),
-                    _mm_sub_ps(from_origin(ky), _mm_mul_ps(sy, z)),
-                    _mm_mul_ps(sz, z),
-                )
-            };
-            let (ax, ay, az) = sheared(0);
-            let (bx, by, bz) = sheared(1);
-            let (cx, cy, cz) = sheared(2);
-            let u = _mm_sub_ps(_mm_mul_ps(cx, by), _mm_mul_ps(cy, bx));
-            let v = _mm_sub_ps(_mm_mul_ps(ax, cy), _mm_mul_ps(ay, cx));
-            let w = _mm_sub_ps(_mm_mul_ps(bx, ay), _mm_mul_ps(by, ax));
+            let z = from_origin(leaf, ray, kz);
+            let x = from_origin(leaf, ray, kx);
+            let x = _mm256_sub_ps(x, _mm256_mul_ps(_mm256_set1_ps(ray.shear[0]), z));
+            let y = from_origin(leaf, ray, ky);
+            let y = _mm256_sub_ps(y, _mm256_mul_ps(_mm256_set1_ps(ray.shear[1]), z));
+            let (bc, ca) = (places(leaf.second_and_third()), places(leaf.third_and_first()));
+            let (x_bc, x_ca) = (pick(x, bc), pick(x, ca));
+            let (y_bc, y_ca) = (pick(y, bc), pick(y, ca));
+            // Cx·By − Cy·Bx and Ax·Cy − Ay·Cx.
+            let uv = _mm256_sub_ps(_mm256_mul_ps(x_ca, y_bc), _mm256_mul_ps(y_ca, x_bc));
+            let (u, v) = (low(uv), high(uv));
+            let w =
+                _mm_sub_ps(_mm_mul_ps(low(x_bc), high(y_ca)), _mm_mul_ps(low(y_bc), high(x_ca)));
             let zero = _mm_setzero_ps();
             let least = _mm_min_ps(u, _mm_min_ps(v, w));
             let most = _mm_max_ps(u, _mm_max_ps(v, w));
             let inside = _mm_or_ps(_mm_cmpge_ps(least, zero), _mm_cmple_ps(most, zero));
-            let mut lanes = Lanes { mask: 0, t: [0.0; 4], v: [0.0; 4], w: [0.0; 4] };
+            let mut lanes = Lanes::NONE;
             if _mm_movemask_ps(inside) == 0 {
                 return lanes;
             }
@@ -187,15 +208,19 @@ impl Kernel for Avx2 {
             );
             if _mm_movemask_ps(_mm_and_ps(inside, on_edge)) != 0 {
                 // Rare, and decided in double precision.
-                return Portable::triangles(pack, ray, t_max);
+                return Portable::triangles(leaf, ray, t_max);
             }
+            let z = _mm256_mul_ps(_mm256_set1_ps(ray.shear[2]), z);
+            let (z_bc, az) = (pick(z, bc), high(pick(z, ca)));
+            let (bz, cz) = (low(z_bc), high(z_bc));
             let determinant = _mm_add_ps(_mm_add_ps(u, v), w);
             let inverse = _mm_div_ps(_mm_set1_ps(1.0), determinant);
             let sum = _mm_add_ps(_mm_mul_ps(u, az), _mm_mul_ps(v, bz));
             let t = _mm_mul_ps(_mm_add_ps(sum, _mm_mul_ps(w, cz)), inverse);
             let in_range = _mm_and_ps(_mm_cmpgt_ps(t, zero), _mm_cmple_ps(t, _mm_set1_ps(t_max)));
             let hit = _mm_and_ps(_mm_and_ps(inside, _mm_cmpneq_ps(determinant, zero)), in_range);
-            lanes.mask = _mm_movemask_ps(hit) as u32;
+            // Lanes without a triangle repeat the last one.
+            lanes.mask = _mm_movemask_ps(hit) as u32 & ((1 << leaf.triangles()) - 1);
             if lanes.mask != 0 {
                 _mm_storeu_ps(lanes.t.as_mut_ptr(), t);
                 _mm_storeu_ps(lanes.v.as_mut_ptr(), _mm_mul_ps(v, inverse));
@@ -204,4 +229,63 @@ impl Kernel for Avx2 {
             lanes
         }
     }
+}
+
+// Functions instead of closures: those cannot be made to be inlined.
+
+/// A row of a node's counts.
+///
+/// SAFETY: see the module, as for all below.
+#[inline(always)]
+unsafe fn counts(node: &Node, row: usize) -> __m256 {
+    // SAFETY: see the module.
+    unsafe {
+        let counts = _mm_loadl_epi64(node.counts(row).as_ptr().cast());
+        _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(counts))
+    }
+}
+
+#[inline(always)]
+unsafe fn splat_axis(of: __m128, axis: usize) -> __m256 {
+    // SAFETY: see the module.
+    unsafe { _mm256_permutevar8x32_ps(_mm256_castps128_ps256(of), _mm256_set1_epi32(axis as i32)) }
+}
+
+/// Vertices along an axis, as seen from the ray's origin.
+#[inline(always)]
+unsafe fn from_origin(leaf: Leaf<'_>, ray: &ShearRay, axis: usize) -> __m256 {
+    // SAFETY: see the module.
+    unsafe {
+        let axis = (axis & 3).min(2);
+        let first = leaf.words().as_ptr().add(leaf.first_vertex() + axis * leaf.vertices());
+        _mm256_sub_ps(_mm256_loadu_ps(first.cast()), _mm256_set1_ps(ray.origin[axis]))
+    }
+}
+
+/// Four bits per lane that say which vertex, of which a permutation looks at the lower three.
+#[inline(always)]
+unsafe fn places(corners: u32) -> __m256i {
+    // SAFETY: see the module.
+    unsafe {
+        let shift = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
+        _mm256_srlv_epi32(_mm256_set1_epi32(corners as i32), shift)
+    }
+}
+
+#[inline(always)]
+unsafe fn pick(from: __m256, places: __m256i) -> __m256 {
+    // SAFETY: see the module.
+    unsafe { _mm256_permutevar8x32_ps(from, places) }
+}
+
+#[inline(always)]
+unsafe fn low(of: __m256) -> __m128 {
+    // SAFETY: see the module.
+    unsafe { _mm256_castps256_ps128(of) }
+}
+
+#[inline(always)]
+unsafe fn high(of: __m256) -> __m128 {
+    // SAFETY: see the module.
+    unsafe { _mm256_extractf128_ps::<1>(of) }
 }
