@@ -2,6 +2,7 @@
 
 use glam::{Quat, Vec3};
 
+use super::warnings::Warnings;
 use crate::{
     Bounds, Camera, Geometry, Light, LightKind, Material, Node, Projection, Scene, Transform,
 };
@@ -11,26 +12,34 @@ use crate::{frame_bounds, look_at};
 const YFOV_RAD: f32 = 0.7;
 
 /// Adds a camera that shows everything at time 0, if the scene has none.
-pub(super) fn add_camera(scene: &mut Scene) {
+pub(super) fn add_camera(scene: &mut Scene, warnings: &mut Warnings) {
     /// Width / height. On a narrower canvas the sides are cut off.
     const ASPECT: f32 = 4.0 / 3.0;
     /// What is framed where there is nothing to be seen.
     const EMPTY: Bounds = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
-    /// Half a millimetre: nearer than this, a camera would frame rounding errors.
-    const SMALLEST_RADIUS: f32 = 5e-4;
-    /// The same of the distance from the origin.
-    const SMALLEST_SHARE: f32 = 1e-6;
+    /// A nanometre: squares of a thousandth of it are still numbers.
+    const SMALLEST_RADIUS: f32 = 1e-9;
+    /// The same of the distance from the origin, four steps of single precision: what is smaller would frame rounding errors.
+    const SMALLEST_SHARE: f32 = 2.5e-7;
     /// A hundred light years in kilometres: squares of what is farther away are infinite.
     const FARTHEST: Vec3 = Vec3::splat(1e15);
     if !scene.cameras.is_empty() {
         return;
     }
-    let mut bounds = bounds_in_motion(scene).unwrap_or(EMPTY);
+    let seen = bounds_in_motion(scene);
+    if seen.is_none() && !scene.instances.is_empty() {
+        warnings.add("nothing can be seen: everything has coordinates that are no numbers");
+    }
+    let mut bounds = seen.unwrap_or(EMPTY);
+    if bounds.min.min(-bounds.max).min_element() < -FARTHEST.x {
+        warnings.add("something is farther than 1e15 m from the origin, and is not drawn");
+    }
     bounds.min = bounds.min.clamp(-FARTHEST, FARTHEST);
     bounds.max = bounds.max.clamp(-FARTHEST, FARTHEST);
     let centre = bounds.centre();
     let rounding = SMALLEST_SHARE * centre.abs().max_element();
     if bounds.radius() < SMALLEST_RADIUS.max(rounding) {
+        warnings.add("everything is too small, for where it stands, to be told from a point");
         let half = Vec3::splat(0.5f32.max(100.0 * rounding));
         bounds = Bounds { min: centre - half, max: centre + half };
     }
@@ -39,7 +48,8 @@ pub(super) fn add_camera(scene: &mut Scene) {
     let node = add_node(scene, "added camera", translation, rotation);
     let projection = Projection::Perspective { yfov_rad: YFOV_RAD };
     scene.cameras.push(Camera { name: "added camera".to_owned(), node, projection });
-    scene.notes.push("no camera in the file: added one that shows everything".to_owned());
+    let note = "no camera in the file: added one that looks at everything";
+    scene.notes.push(note.to_owned());
 }
 
 /// Of everything at the begin, and while it moves if that is not much more.

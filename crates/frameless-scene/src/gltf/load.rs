@@ -105,7 +105,11 @@ fn from_bytes(
 fn check_version(root: &Json<'_>) -> Result<(), Fault> {
     let asset = root.required("asset")?;
     refuse_other_than_2(&asset.required("version")?)?;
-    asset.field("minVersion")?.map_or(Ok(()), |version| refuse_other_than_2(&version))
+    // What a reader has to know at least (glTF 2.0 §3.2): here that is 2.0.
+    match asset.field("minVersion")? {
+        Some(least) if least.text()? != "2.0" => Err(least.fault("glTF version 2.0")),
+        _ => Ok(()),
+    }
 }
 
 /// Within a major version, newer files can be read by older readers (glTF 2.0 §3.2).
@@ -196,7 +200,7 @@ fn finish(scene: &mut Scene, mut warnings: Warnings) {
     if scene.instances.is_empty() {
         warnings.add("the file has nothing to draw");
     }
-    add_camera(scene);
+    add_camera(scene, &mut warnings);
     add_light(scene);
     scene.warnings = warnings.into_lines();
     for warning in &scene.warnings {

@@ -169,7 +169,7 @@ fn cameras_and_lights_stand_at_their_nodes() {
 /// Seen from the added camera, every corner lies inside a picture of 4:3.
 #[test]
 fn the_added_camera_sees_everything() {
-    for (scale, place) in [(1.0, 0.0), (1e-2, 5.0), (1e4, -1e5)] {
+    for (scale, place) in [(1.0, 0.0), (1e-2, 5.0), (1e4, -1e5), (1e-7, 0.0), (100.0, 1e7)] {
         let mut maker = Maker::with_primitive(
             |maker| json!({"attributes": {"POSITION": maker.floats("VEC3", &SQUARE)}, "mode": 6}),
         );
@@ -188,6 +188,23 @@ fn the_added_camera_sees_everything() {
             assert!(seen.z < 0.0 && slope <= (yfov_rad / 2.0).tan(), "{scale}: {seen}");
         }
         assert!(scene.notes[0].contains("camera") && scene.notes[1].contains("light"));
+    }
+}
+
+#[test]
+fn what_no_camera_can_show_is_warned_of() {
+    for (scale, place, warning) in [
+        (0.0, 1.0, "told from a point"),
+        (1.0, 1e9, "told from a point"),
+        (1e16, 0.0, "farther than 1e15 m"),
+    ] {
+        let mut maker = Maker::with_primitive(
+            |maker| json!({"attributes": {"POSITION": maker.floats("VEC3", &SQUARE)}, "mode": 6}),
+        );
+        maker.json["nodes"][0]["scale"] = json!([scale, scale, scale]);
+        maker.json["nodes"][0]["translation"] = json!([place, place, place]);
+        let warnings = maker.load().warnings;
+        assert!(warnings.iter().any(|w| w.contains(warning)), "{scale}: {warnings:?}");
     }
 }
 

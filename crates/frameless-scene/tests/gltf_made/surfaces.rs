@@ -312,6 +312,10 @@ fn other_versions_are_refused() {
     let mut maker = Maker::new();
     maker.json["asset"] = json!({"version": "2.1"});
     assert!(maker.try_load().is_ok());
+    maker.json["asset"] = json!({"version": "2.1", "minVersion": "2.0"});
+    assert!(maker.try_load().is_ok());
+    maker.json["asset"] = json!({"version": "2.1", "minVersion": "2.1"});
+    assert!(maker.refusal().contains("/asset/minVersion: wanted glTF version 2.0"));
 }
 
 /// A lamp is made to light the scene; a screen is not.
