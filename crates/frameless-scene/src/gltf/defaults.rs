@@ -23,6 +23,8 @@ pub(super) fn add_camera(scene: &mut Scene, warnings: &mut Warnings) {
     const SMALLEST_SHARE: f32 = 2.5e-7;
     /// A hundred light years in kilometres: squares of what is farther away are infinite.
     const FARTHEST: Vec3 = Vec3::splat(1e15);
+    /// What is farther away may be lost.
+    const DRAWN: f32 = 1.001e12;
     if !scene.cameras.is_empty() {
         return;
     }
@@ -31,8 +33,8 @@ pub(super) fn add_camera(scene: &mut Scene, warnings: &mut Warnings) {
         warnings.add("nothing can be seen: everything has coordinates that are no numbers");
     }
     let mut bounds = seen.unwrap_or(EMPTY);
-    if bounds.min.min(-bounds.max).min_element() < -FARTHEST.x {
-        warnings.add("something is farther than 1e15 m from the origin, and is not drawn");
+    if bounds.min.min(-bounds.max).min_element() < -DRAWN {
+        warnings.add("something is farther than 1e12 m from the origin, and may not be drawn");
     }
     bounds.min = bounds.min.clamp(-FARTHEST, FARTHEST);
     bounds.max = bounds.max.clamp(-FARTHEST, FARTHEST);

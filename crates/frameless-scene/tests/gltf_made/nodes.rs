@@ -196,7 +196,7 @@ fn what_no_camera_can_show_is_warned_of() {
     for (scale, place, warning) in [
         (0.0, 1.0, "told from a point"),
         (1.0, 1e9, "told from a point"),
-        (1e16, 0.0, "farther than 1e15 m"),
+        (1e13, 0.0, "farther than 1e12 m"),
     ] {
         let mut maker = Maker::with_primitive(
             |maker| json!({"attributes": {"POSITION": maker.floats("VEC3", &SQUARE)}, "mode": 6}),
