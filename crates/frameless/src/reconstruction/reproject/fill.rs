@@ -1,4 +1,4 @@
-//! Large holes show what the nearest pixel shows that is none.
+//! How old large holes are taken to be: as the nearest pixel that is none. What they show: [`smooth`](super::smooth).
 //!
 //! Two passes over the holes hand on the nearest known pixel from neighbour to neighbour, down and to the right, then up and to
 //! the left (Danielsson 1980, "Euclidean distance mapping"): not always the very nearest, but at a cost that does not depend on

@@ -6,8 +6,8 @@
 //! ```
 //!
 //! The reference is the pixel's own sample with the least expected error. Pixels without one are holes: beside samples they show
-//! the mean of those around that belong to the nearest one's object, farther away what the nearest pixel shows that is no hole
-//! ([`fill`](super::fill)).
+//! the mean of those around that belong to the nearest one's object, farther away something smooth between what is known
+//! ([`smooth`](super::smooth)), as old as the nearest pixel that is no hole ([`fill`](super::fill)).
 //!
 //! A tile in which nothing has been touched goes on showing what it shows, as long as all its samples would still be taken as they are.
 
