@@ -9,7 +9,7 @@ pub(crate) mod avx2;
 use glam::Vec3A;
 
 use crate::leaf::{Leaf, MOST_TRIANGLES};
-use crate::ray::Ray;
+use crate::ray::{Hit, Ray};
 use crate::traverse::Entry;
 use crate::wide::Node;
 
@@ -102,6 +102,26 @@ impl Lanes {
         let zero = [0.0; MOST_TRIANGLES];
         Lanes { mask: 0, t: zero, v: zero, w: zero }
     };
+
+    /// The triangles of the leaf that were hit, one after the other. `place`: instance and triangle of what is in the leaf.
+    #[inline(always)]
+    pub(crate) fn hits(
+        &self,
+        leaf: Leaf<'_>,
+        place: impl Fn(u32) -> (u32, u32),
+    ) -> impl Iterator<Item = Hit> {
+        let mut mask = self.mask;
+        std::iter::from_fn(move || {
+            if mask == 0 {
+                return None;
+            }
+            let lane = mask.trailing_zeros() as usize & 3;
+            mask &= mask - 1;
+            let (instance, primitive) = place(leaf.triangle(lane));
+            let barycentric = [self.v[lane], self.w[lane]];
+            Some(Hit { t: self.t[lane], barycentric, primitive, instance })
+        })
+    }
 }
 
 /// A ray prepared for boxes.

@@ -426,13 +426,7 @@ fn alone<K: Kernel>(
         let ray = rays.trailing_zeros() as usize % TOGETHER;
         rays &= rays - 1;
         let lanes = K::triangles(leaf, &packet.one(ray), packet.t_max[ray / 8][ray % 8]);
-        let mut mask = lanes.mask;
-        while mask != 0 {
-            let lane = mask.trailing_zeros() as usize & 3;
-            mask &= mask - 1;
-            let (instance, primitive) = place(leaf.triangle(lane));
-            let barycentric = [lanes.v[lane], lanes.w[lane]];
-            let hit = Hit { t: lanes.t[lane], barycentric, primitive, instance };
+        for hit in lanes.hits(leaf, place) {
             if let Some(t_max) = finds.hit(ray, &hit) {
                 packet.t_max[ray / 8][ray % 8] = t_max;
                 *found = true;

@@ -491,13 +491,7 @@ pub(crate) fn take<const ANY: bool>(
     mut stops: impl FnMut(&Hit) -> bool,
 ) -> bool {
     let mut found = false;
-    let mut mask = lanes.mask;
-    while mask != 0 {
-        let lane = mask.trailing_zeros() as usize & 3;
-        mask &= mask - 1;
-        let (instance, primitive) = place(leaf.triangle(lane));
-        let barycentric = [lanes.v[lane], lanes.w[lane]];
-        let hit = Hit { t: lanes.t[lane], barycentric, primitive, instance };
+    for hit in lanes.hits(leaf, place) {
         if hit.is_before(best) && stops(&hit) {
             *best = hit;
             found = true;

@@ -6,7 +6,7 @@ use super::Atlas;
 use crate::wire::Codec;
 
 /// All frequencies of all channels are rounded to so many steps of JPEG's. Less brings more bytes than it takes from the error.
-const STEP: u16 = 16;
+const STEP: u16 = 15;
 /// But the mean of a block, eight of whose steps are one of brightness: tiles without detail are as good as exact.
 const MEAN_STEP: u16 = 4;
 /// Of no meaning where tables are given.

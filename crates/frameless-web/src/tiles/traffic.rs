@@ -105,7 +105,7 @@ fn a_moving_ball_costs_little_and_looks_right() {
         measured.tiles_per_picture
     );
     // At what a slow machine traces; on the page of a faster one it is 2 dB more (docs/performance.md).
-    assert!(measured.psnr >= 36.0, "{} dB", measured.psnr);
+    assert!(measured.psnr >= 36.5, "{} dB", measured.psnr);
     assert!(measured.bytes_per_sec <= 600e3, "{} bytes/s", measured.bytes_per_sec);
     // 768 tiles: what rests is not sent again and again.
     assert!(measured.tiles_per_picture < 150.0, "{} tiles", measured.tiles_per_picture);
