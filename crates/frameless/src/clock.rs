@@ -67,6 +67,14 @@ impl Clock {
         }
     }
 
+    /// Real clock: since `begin` the loop has done something else, such as a picture, which says nothing of the renderer.
+    pub(crate) fn interrupted(&mut self, begin: Time) {
+        let end = self.now();
+        if let Clock::Real(clock) = self {
+            clock.interrupted(begin, end);
+        }
+    }
+
     /// Real clock: learn that a batch chosen at `begin` has been answered.
     pub(crate) fn called(&mut self, samples: usize, begin: Time) {
         let end = self.now();
@@ -124,6 +132,8 @@ pub struct Real {
     allowance_at: Time,
     secs_per_sample: f64,
     last_answer: Option<Time>,
+    /// Since the last interruption.
+    has_learned: bool,
     /// For a renderer whose calls have a price.
     length: Option<BatchLength>,
 }
@@ -145,6 +155,7 @@ impl Real {
             allowance_at: Time::ZERO,
             secs_per_sample: 1.0 / (FIRST_BATCH as f64 * REAL_BATCHES_PER_SEC),
             last_answer: None,
+            has_learned: false,
             length: None,
         }
     }
@@ -194,8 +205,17 @@ impl Real {
             // else the machine does may hold up a batch.
             let measured = measured.clamp(0.25 * self.secs_per_sample, 8.0 * self.secs_per_sample);
             self.secs_per_sample += LEARNING_RATE * (measured - self.secs_per_sample);
+            self.has_learned = true;
         }
         self.last_answer = busy.then_some(now);
+    }
+
+    /// The time until the next answer is not measured, since the renderer may have worked on meanwhile. But where nothing is learned between
+    /// interruptions, as in a loop that makes a picture after each turn, it is measured without the interruption.
+    fn interrupted(&mut self, begin: Time, end: Time) {
+        let without = self.last_answer.map(|last| Time(last.0 + end.0 - begin.0));
+        self.last_answer = if self.has_learned { None } else { without };
+        self.has_learned = false;
     }
 
     /// Samples in a batch that lasts as long as it should.
@@ -285,5 +305,19 @@ mod tests {
         let slow = batches(&mut clock, 1e-4, 2);
         let long: f64 = slow.iter().map(|batch| batch.1).filter(|&secs| secs > 1.1e-3).sum();
         assert!(long < 3.0 * slow[0].1, "{slow:?}");
+    }
+
+    #[test]
+    fn a_picture_after_each_answer_does_not_keep_batches_short() {
+        let Clock::Real(mut clock) = Clock::real() else { unreachable!() };
+        let (mut now, secs_per_sample) = (0.0, 1e-6);
+        for _ in 0..400 {
+            now += clock.batch_length() as f64 * secs_per_sample;
+            clock.answered_at(Time::from_secs(now), clock.batch_length(), true);
+            clock.interrupted(Time::from_secs(now), Time::from_secs(now + 20e-3));
+            now += 20e-3;
+        }
+        let (length, best) = (clock.batch_length() as f64, 1.0 / (REAL_BATCHES_PER_SEC * 1e-6));
+        assert!((0.8 * best..1.2 * best).contains(&length), "{length} samples, {best} are right");
     }
 }

@@ -449,8 +449,7 @@ impl<T: Tracer> Engine<T> {
     pub fn refresh(&mut self, now: Time) -> &[[f32; 3]] {
         self.take_back();
         self.is_first_picture = false;
-        // The time until the next answer will say nothing of how fast the renderer is.
-        self.clock.answered(0, false);
+        let begin = self.clock.now();
         let (secs, size) = (self.timeline.scene_secs(now), self.canvas.size());
         let pose = self.tracer.pose(secs, size, &mut self.pose).then_some(&self.pose);
         let lighting =
@@ -470,6 +469,7 @@ impl<T: Tracer> Engine<T> {
             threads: self.refresh_threads,
         };
         self.reconstruction.refresh(&refresh, &mut self.canvas);
+        self.clock.interrupted(begin);
         self.reconstruction.picture()
     }
 

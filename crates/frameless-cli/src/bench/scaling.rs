@@ -105,12 +105,12 @@ fn run(world: &Arc<World>, case: &Case, args: &BenchArgs, threads: usize, seed: 
     let mut engine = Engine::new(args.size, Clock::real(), sampler, waited);
     engine.set_reconstruction(case.reconstruction.build());
     engine.set_refresh_threads(threads);
-    let mut run_for = |secs: f64| {
+    let mut run_for = |secs: f64, has_pictures: bool| {
         let (begin, kept, waited) = (clock.now(), engine.counters().kept, engine.tracer().secs);
         let mut picture_at = begin.secs();
         while clock.now().secs_since(begin) < secs {
             engine.step().expect("the tracer's colours are finite");
-            if surfaces && clock.now().secs() >= picture_at {
+            if has_pictures && clock.now().secs() >= picture_at {
                 engine.refresh(engine.now());
                 picture_at += SECS_PER_PICTURE;
             }
@@ -121,8 +121,9 @@ fn run(world: &Arc<World>, case: &Case, args: &BenchArgs, threads: usize, seed: 
             serial_share: 1.0 - (engine.tracer().secs - waited) / elapsed,
         }
     };
-    run_for(WARM_UP_SECS);
-    run_for(args.secs)
+    // A picture of which nothing is known takes longer than there is between two: with them from the beginning one thread would never get far.
+    run_for(WARM_UP_SECS, false);
+    run_for(args.secs, surfaces)
 }
 
 /// Adds up how long the loop's thread is with the renderer.
