@@ -11,30 +11,29 @@ use crate::wide::{F8, Unit};
 pub(super) const BLOCK: usize = 16;
 
 /// Consecutive tiles; of the last block some may not be there, and have no share.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
 pub(super) struct Block {
     /// c.
     pub(super) credit: [f32; BLOCK],
     /// w.
     pub(super) weight: [f32; BLOCK],
-    /// e.
-    pub(super) even: [f32; BLOCK],
 }
 
 impl Block {
-    /// Σ w and Σ e.
-    pub(super) fn sums(&self) -> (f32, f32) {
-        (sum(&self.weight), sum(&self.even))
-    }
-
-    /// Calls `take` with the tiles that are drawn, when the block has got `got` draws; nobody if none has a share.
+    /// Calls `take` with the tiles that are drawn, when the block has got `got` draws; nobody if none has a share. `even`: e.
     #[inline(always)]
-    pub(super) fn draw<U: Unit>(&mut self, a: f32, b: f32, got: f32, mut take: impl FnMut(usize)) {
+    pub(super) fn draw<U: Unit>(
+        &mut self,
+        [a, b]: [f32; 2],
+        even: &[f32; BLOCK],
+        got: f32,
+        mut take: impl FnMut(usize),
+    ) {
         let (a, b) = (F8::<U>::splat(a), F8::splat(b));
         let mut q = [0.0; BLOCK];
         for half in [0, BLOCK / 2] {
-            let eight = a * F8::load(&self.weight, half) + b * F8::load(&self.even, half);
+            let eight = a * F8::load(&self.weight, half) + b * F8::load(even, half);
             q[half..half + BLOCK / 2].copy_from_slice(&eight.lanes());
         }
         let shares = sum(&q);
@@ -62,7 +61,7 @@ impl Block {
 
 /// In pairs, which a processor adds side by side.
 #[inline(always)]
-fn sum(numbers: &[f32; BLOCK]) -> f32 {
+pub(super) fn sum(numbers: &[f32; BLOCK]) -> f32 {
     let mut fours = [0.0; 4];
     for numbers in numbers.as_chunks::<4>().0 {
         for (sum, number) in fours.iter_mut().zip(numbers) {
@@ -78,13 +77,13 @@ mod tests {
     use crate::wide::{self, Task};
 
     /// What one block draws by turns.
-    struct Turns<'a>(&'a mut Block, f32, &'a mut Vec<usize>);
+    struct Turns<'a>(&'a mut Block, &'a [f32; BLOCK], f32, &'a mut Vec<usize>);
 
     impl Task for Turns<'_> {
         #[inline(always)]
         fn run<U: Unit>(self) {
-            let Turns(block, got, drawn) = self;
-            block.draw::<U>(2.0, 0.25, got, |tile| drawn.push(tile));
+            let Turns(block, even, got, drawn) = self;
+            block.draw::<U>([2.0, 0.25], even, got, |tile| drawn.push(tile));
         }
     }
 
@@ -93,21 +92,23 @@ mod tests {
         // q = 2, 0.75 and 0.25 of 3.
         let mut block = Block::default();
         [block.weight[0], block.weight[3]] = [1.0, 0.25];
-        [block.even[3], block.even[9]] = [1.0, 1.0];
+        let mut even = [0.0; BLOCK];
+        [even[3], even[9]] = [1.0, 1.0];
         block.credit[9] = 0.75;
         let mut draw = |got: f32| {
             let mut drawn = Vec::new();
-            wide::run(Turns(&mut block, got, &mut drawn));
+            wide::run(Turns(&mut block, &even, got, &mut drawn));
             drawn
         };
         assert_eq!(draw(1.5), [0], "1, 0.375 and 0.875");
         assert_eq!(draw(3.0), [0, 0, 3, 9], "2, 0.375 + 0.75 and 0.875 + 0.25");
         assert_eq!(draw(0.0), []);
         block = Block::default();
-        wide::run(Turns(&mut block, 5.0, &mut Vec::new()));
+        let nothing = &[0.0; BLOCK];
+        wide::run(Turns(&mut block, nothing, 5.0, &mut Vec::new()));
         assert_eq!(block.credit, [0.0; BLOCK], "nobody has a share");
         block.weight[5] = f32::from_bits(1);
-        wide::run(Turns(&mut block, 5.0, &mut Vec::new()));
+        wide::run(Turns(&mut block, nothing, 5.0, &mut Vec::new()));
         assert_eq!(block.credit, [0.0; BLOCK], "shares so small that a draw of them is infinite");
     }
 }

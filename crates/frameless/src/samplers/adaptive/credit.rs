@@ -14,14 +14,20 @@
 use super::AdaptiveStage;
 use super::order::{self, Order};
 use super::shares::Shares;
+use super::tiles::{Tile, Tiles};
+use super::why::Why;
 use crate::rates::Rates;
-use crate::traced::{Mark, Place};
-use crate::{Canvas, Rng, Time};
+use crate::tile::TileGrid;
+use crate::traced::{Mark, Place, TILE_PIXELS};
+use crate::{Canvas, Rng, Time, wide};
 
 /// ε: the part of the samples that is spread evenly over the picture, so that every pixel has a floor frequency.
 const EVENLY: f32 = 0.2;
 /// Added to v: so that a picture at rest is refined evenly.
 const LEAST_RATE: f32 = 1e-7;
+
+/// Of how many tiles the marks are fetched at once.
+const FEW: usize = 64;
 
 /// Whose turn it is, among the tiles and in each of them.
 pub(crate) struct Credit {
@@ -29,9 +35,8 @@ pub(crate) struct Credit {
     order: Order,
     /// Whether all tiles have the same share.
     evenly: bool,
-    tiles: Vec<u32>,
-    /// The first pixel of each.
-    first: Vec<Place>,
+    /// Of the draw at hand.
+    drawn: Vec<u32>,
 }
 
 /// m √v.
@@ -41,19 +46,25 @@ fn weight(m: f32, rate: f32) -> f32 {
 }
 
 impl Credit {
-    pub(crate) fn new(tiles: usize, without: Option<AdaptiveStage>, rng: &mut Rng) -> Credit {
-        let shares = Shares::new(tiles, rng);
-        let mut order = Order::new(tiles, rng);
+    pub(crate) fn new(
+        tiles: &mut Tiles,
+        count: usize,
+        without: Option<AdaptiveStage>,
+        rng: &mut Rng,
+    ) -> Credit {
+        let shares = Shares::new(count, rng);
+        let mut order = Order::new();
+        tiles.all_mut().for_each(|tile| tile.turn = Order::begin(rng));
         if without == Some(AdaptiveStage::Bayer) {
             order.forget(Rng::new(u64::from(rng.next_u32())));
         }
         let evenly = without == Some(AdaptiveStage::Rates);
-        Credit { shares, order, evenly, tiles: Vec::new(), first: Vec::new() }
+        Credit { shares, order, evenly, drawn: Vec::new() }
     }
 
     /// What tiles count has changed, all at once.
     pub(crate) fn weigh_all(&mut self, rates: &Rates, m: impl Fn(usize) -> f32) {
-        self.shares.set_all(|tile| (weight(m(tile), rates.of_tile(tile)), 1.0));
+        self.shares.set_weights(|tile| weight(m(tile), rates.of_tile(tile)));
     }
 
     /// A tile's v has changed.
@@ -88,26 +99,34 @@ impl Credit {
         &mut self,
         now: Time,
         canvas: &Canvas,
-        rates: &Rates,
+        grid: &TileGrid,
+        tiles: &mut Tiles,
         [count, least_even]: [f32; 2],
-        mut take: impl FnMut(Place),
+        mut take: impl FnMut(u32),
     ) {
         let (a, b) = self.scale(count, least_even);
-        self.tiles.clear();
-        self.shares.draw(a, b, &mut self.tiles);
-        // What is looked at lies all over the picture. In a loop so short many places are fetched at once.
-        let traced = canvas.traced();
-        self.first.clear();
-        for &tile in &self.tiles {
-            rates.prefetch(tile as usize);
-            let place = self.order.next(&rates.grid, tile as usize);
-            traced.prefetch(place);
-            self.first.push(place);
-        }
-        let now = Mark::at(now);
-        for &first in &self.first {
-            let (age, enough) = (traced.mark(first).age(now), order::enough(rates, first.tile()));
-            take(self.order.old_enough(now, traced, enough, (first, age)));
+        let (marks, now) = (canvas.traced().tiles(), Mark::at(now));
+        let Credit { shares, order, drawn, .. } = self;
+        drawn.clear();
+        shares.draw(a, b, drawn);
+        // What is looked at lies all over the picture: it is fetched before, tile by tile and then a few tiles' marks.
+        drawn.iter().for_each(|&tile| tiles.prefetch(tile as usize));
+        for few in drawn.chunks(FEW) {
+            for &tile in few {
+                let (tile, turn) = (tile as usize, tiles.of(tile as usize).turn);
+                // A tile's pixels in their order are in two of its four lines by turns.
+                wide::prefetch(marks[tile].0.as_slice(), order.peek(turn));
+                wide::prefetch(marks[tile].0.as_slice(), order.peek(turn.wrapping_add(1)));
+            }
+            for &tile in few {
+                let tile = tile as usize;
+                let (pixels, marks) = (grid.pixels_of(tile), &marks[tile]);
+                let Tile { turn, reasons, mean_age_secs, .. } = tiles.of_mut(tile);
+                let enough = order::enough(*mean_age_secs);
+                let within = order.old_enough(now, marks, pixels, turn, enough);
+                reasons.set(1 << within, Why::Tile);
+                take(grid.pixel(Place(TILE_PIXELS * tile + within)));
+            }
         }
     }
 }

@@ -5,6 +5,8 @@
 
 use std::collections::VecDeque;
 
+use super::tiles::{Tile, Tiles};
+use super::why::Why;
 use crate::tile::TileGrid;
 use crate::traced::{Mark, Place, TILE_PIXELS, Traced, half_ticks};
 use crate::wide::{self, M8, Task, Unit};
@@ -20,23 +22,23 @@ const ADAPT_PER_SEC: f64 = 29.0;
 const MOST_AT_ONCE: f64 = 2.0;
 
 /// How many tiles ahead of the one looked at the next is fetched.
-const AHEAD: usize = 4;
+const AHEAD: usize = 8;
 
 /// Pixels beside changes, tile by tile.
 pub(crate) struct Front {
     waiting: VecDeque<u32>,
-    tiles: Vec<TileFront>,
     /// Neighbours younger than this are left alone.
     fresh_secs: f32,
     /// When that was adapted last.
     adapted: Time,
-    // Of the observations at hand.
+    /// Of the observations at hand, those that are part of a front, and room for the others.
     changed: Vec<(Place, Mark)>,
+    parts: usize,
 }
 
 /// A bit per pixel of a tile.
-#[derive(Clone, Copy, Default)]
-struct TileFront {
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct TileFront {
     /// Those beside changes.
     beside: u64,
     /// Those to be looked at again however young they are.
@@ -45,10 +47,18 @@ struct TileFront {
     waits: bool,
 }
 
+impl TileFront {
+    /// A pixel has just been traced.
+    #[inline]
+    pub(super) fn traced(&mut self, within: usize) {
+        self.beside &= !(1 << within);
+    }
+}
+
 /// Whether what was known there is wrong now.
 #[inline]
 pub(super) fn is_part(observed: &Observation) -> bool {
-    observed.known && observed.change > 3.0 * FRONT_CHANGE
+    observed.known & (observed.change > 3.0 * FRONT_CHANGE)
 }
 
 /// The neighbours of a pixel of a tile.
@@ -93,13 +103,13 @@ const BESIDE: [Beside; TILE_PIXELS] = {
 };
 
 impl Front {
-    pub(crate) fn new(tiles: usize) -> Front {
+    pub(crate) fn new() -> Front {
         Front {
             waiting: VecDeque::new(),
-            tiles: vec![TileFront::default(); tiles],
             fresh_secs: FRESH_SECS[1],
             adapted: Time::ZERO,
             changed: Vec::new(),
+            parts: 0,
         }
     }
 
@@ -112,50 +122,46 @@ impl Front {
         self.fresh_secs = (self.fresh_secs * factor).clamp(FRESH_SECS[0], FRESH_SECS[1]);
     }
 
-    /// The neighbours of samples that are part of a front wait from now on, but of late looks. `places` are those of the observations.
-    pub(crate) fn observe(
-        &mut self,
-        observations: &[Observation],
-        places: &[Place],
-        canvas: &Canvas,
-        is_late: impl Fn(Place) -> bool,
-    ) {
-        // In a list of their own, so that nobody has to guess who is part of a front.
-        let mut changed = std::mem::take(&mut self.changed);
-        changed.resize(observations.len(), Default::default());
-        let mut parts = 0;
-        for (observed, &place) in observations.iter().zip(places) {
-            changed[parts] = (place, Mark::at(observed.now));
-            parts += usize::from(is_part(observed) & !is_late(place));
-        }
+    /// So many samples will be heard of.
+    pub(crate) fn expect(&mut self, samples: usize) {
+        self.changed.resize(samples, Default::default());
+        self.parts = 0;
+    }
+
+    /// A sample that was traced, and may be part of a front. Late looks are not.
+    #[inline]
+    pub(crate) fn hear(&mut self, observed: &Observation, place: Place, why: Why) {
+        // Written in any case, so that nobody has to guess who is.
+        self.changed[self.parts] = (place, Mark::at(observed.now));
+        self.parts += usize::from(is_part(observed) & (why != Why::Late));
+    }
+
+    /// The neighbours of samples that are part of a front wait from now on.
+    pub(crate) fn observe(&mut self, tiles: &mut Tiles, canvas: &Canvas) {
+        let changed = std::mem::take(&mut self.changed);
         let (traced, fresh) = (canvas.traced(), half_ticks(self.fresh_secs));
-        wide::run(QueueBeside { front: self, traced, fresh, changed: &changed[..parts] });
+        wide::run(QueueBeside {
+            traced,
+            fresh,
+            changed: &changed[..self.parts],
+            front: self,
+            tiles,
+        });
         self.changed = changed;
     }
 
-    /// A pixel has just been traced.
     #[inline]
-    pub(crate) fn traced(&mut self, place: Place) {
-        self.tiles[place.tile()].beside &= !(1 << place.within());
-    }
-
-    /// Begin to fetch what is known of a tile.
-    #[inline]
-    pub(crate) fn prefetch(&self, tile: usize) {
-        wide::prefetch(&self.tiles, tile);
-    }
-
-    #[inline]
-    fn wait(&mut self, tile: usize) {
-        if !std::mem::replace(&mut self.tiles[tile].waits, true) {
+    fn wait(&mut self, tile: usize, front: &mut TileFront) {
+        if !std::mem::replace(&mut front.waits, true) {
             self.waiting.push_back(tile as u32);
         }
     }
 
     /// A pixel that had better be looked at again.
-    pub(crate) fn suspect(&mut self, place: Place) {
-        self.tiles[place.tile()].suspect |= 1 << place.within();
-        self.wait(place.tile());
+    pub(crate) fn suspect(&mut self, tiles: &mut Tiles, place: Place) {
+        let front = &mut tiles.of_mut(place.tile()).front;
+        front.suspect |= 1 << place.within();
+        self.wait(place.tile(), front);
     }
 
     /// Of how many seconds neighbours are left alone now.
@@ -164,35 +170,37 @@ impl Front {
         self.fresh_secs
     }
 
-    /// Calls `take` with one tile after another and the pixels of it that are to be looked at; it returns those for which it has no room.
-    /// Whether nobody has to wait.
+    /// Calls `take` with one tile after another and the pixels of it that are to be looked at; it returns those that are taken and those
+    /// for which it has no room. Whether nobody has to wait.
     pub(crate) fn follow(
         &mut self,
+        tiles: &mut Tiles,
         grid: &TileGrid,
-        mut take: impl FnMut(usize, u64) -> u64,
+        mut take: impl FnMut(usize, u64) -> [u64; 2],
     ) -> bool {
         while let Some(&tile) = self.waiting.front() {
             if let Some(&later) = self.waiting.get(AHEAD) {
-                self.prefetch(later as usize);
+                tiles.prefetch(later as usize);
             }
             let tile = tile as usize;
-            let TileFront { beside, suspect, .. } = self.tiles[tile];
-            let pixels = (beside | suspect) & grid.pixels_of(tile);
-            let left = if pixels == 0 { 0 } else { take(tile, pixels) };
+            let Tile { front, reasons, .. } = tiles.of_mut(tile);
+            let pixels = (front.beside | front.suspect) & grid.pixels_of(tile);
+            let [taken, left] = if pixels == 0 { [0; 2] } else { take(tile, pixels) };
+            reasons.set(taken, Why::Front);
             if left != 0 {
-                let (beside, suspect) = (beside & left, suspect & left);
-                self.tiles[tile] = TileFront { beside, suspect, waits: true };
+                front.beside &= left;
+                front.suspect &= left;
                 return false;
             }
-            self.tiles[tile] = TileFront::default();
+            *front = TileFront::default();
             self.waiting.pop_front();
         }
         true
     }
 
-    pub(crate) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self, tiles: &mut Tiles) {
         for tile in self.waiting.drain(..) {
-            self.tiles[tile as usize] = TileFront::default();
+            tiles.of_mut(tile as usize).front = TileFront::default();
         }
     }
 }
@@ -200,6 +208,7 @@ impl Front {
 /// Queues what is beside pixels that have changed.
 struct QueueBeside<'a> {
     front: &'a mut Front,
+    tiles: &'a mut Tiles,
     traced: &'a Traced,
     /// In half ticks.
     fresh: i32,
@@ -212,7 +221,7 @@ impl Task for QueueBeside<'_> {
     fn run<U: Unit>(mut self) {
         for (i, &(place, found)) in self.changed.iter().enumerate() {
             if let Some(&(later, _)) = self.changed.get(i + AHEAD) {
-                self.traced.prefetch(later);
+                self.traced.prefetch_around(later);
             }
             let Beside { own, others, step } = &BESIDE[place.within()];
             self.queue::<U>(place.tile(), *own, found);
@@ -224,21 +233,24 @@ impl Task for QueueBeside<'_> {
 }
 
 impl QueueBeside<'_> {
-    /// Of some `pixels` of a tile, at least one, those that were traced `fresh` before a change was `found`, or earlier.
+    /// Of some `pixels` of a tile, in at most three rows, those that were traced `fresh` before a change was `found`, or earlier.
     #[inline(always)]
     fn queue<U: Unit>(&mut self, tile: usize, pixels: u64, found: Mark) {
         let marks = &self.traced.tiles()[tile].0;
-        let (first, last) = (pixels.trailing_zeros() / 8, (63 - pixels.leading_zeros()) / 8);
+        // Always three rows, so that nobody has to guess how many.
+        let first = (pixels.trailing_zeros() / 8).min(5);
         let latest = M8::<U>::splat(found.0.wrapping_sub(self.fresh as u32));
         let mut young = 0;
-        for row in first..=last {
-            let since = latest.minus(M8::load(marks, 8 * row as usize));
+        for row in 0..3 {
+            let since = latest.minus(M8::load(marks, 8 * (first + row) as usize));
             young |= u64::from(since.less_than(M8::splat(0)).bits() & 255) << (8 * row);
         }
-        let stale = pixels & !young;
-        if stale != 0 {
-            self.front.tiles[tile].beside |= stale;
-            self.front.wait(tile);
+        let stale = pixels & !(young << (8 * first));
+        let front = &mut self.tiles.of_mut(tile).front;
+        front.beside |= stale;
+        if (stale != 0) & !front.waits {
+            front.waits = true;
+            self.front.waiting.push_back(tile as u32);
         }
     }
 
@@ -278,20 +290,36 @@ mod tests {
         Observation { pixel, now, previous: Time::ZERO, known: true, change, refinement: None }
     }
 
-    fn observe(front: &mut Front, canvas: &Canvas, observed: Observation) {
-        let place = canvas.traced().place(observed.pixel);
-        front.observe(&[observed], &[place], canvas, |_| false);
+    /// Fronts, and the tiles that they are in.
+    struct Fronts(Front, Tiles);
+
+    impl Fronts {
+        fn new(tiles: usize) -> Fronts {
+            Fronts(Front::new(), Tiles::new(tiles))
+        }
+
+        fn observe(&mut self, canvas: &Canvas, observed: Observation) {
+            let Fronts(front, tiles) = self;
+            let place = canvas.traced().place(observed.pixel);
+            front.expect(1);
+            front.hear(&observed, place, tiles.of(place.tile()).reasons.of(place.within()));
+            front.observe(tiles, canvas);
+        }
+
+        fn traced(&mut self, place: Place) {
+            self.1.of_mut(place.tile()).front.traced(place.within());
+        }
     }
 
     /// All pixels that are to be looked at, in the order of the picture.
-    fn followed(front: &mut Front, canvas: &Canvas) -> Vec<u32> {
+    fn followed(Fronts(front, tiles): &mut Fronts, canvas: &Canvas) -> Vec<u32> {
         let mut pixels = Vec::new();
         let take = |tile: usize, bits: u64| {
             let places = (0..64).filter(|i| bits >> i & 1 == 1).map(|i| Place(64 * tile + i));
             pixels.extend(places.map(|place| canvas.traced().grid().pixel(place)));
-            0
+            [bits, 0]
         };
-        assert!(front.follow(canvas.traced().grid(), take));
+        assert!(front.follow(tiles, canvas.traced().grid(), take));
         pixels.sort_unstable();
         pixels
     }
@@ -300,10 +328,10 @@ mod tests {
     fn the_neighbours_of_a_change_are_next_unless_they_are_fresh() {
         let size = Size::new(4, 3);
         let mut canvas = Canvas::from_picture(size, vec![[0.0; 3]; 12]);
-        let mut front = Front::new(1);
+        let mut front = Fronts::new(1);
         let now = Time::from_secs(1.0);
         canvas.replace(1, Time::from_secs(0.995), [0.0; 3]);
-        observe(&mut front, &canvas, found(0, now, 0.1));
+        front.observe(&canvas, found(0, now, 0.1));
         assert_eq!(
             followed(&mut front, &canvas),
             [4, 5],
@@ -319,8 +347,8 @@ mod tests {
     fn who_was_traced_since_is_left_out() {
         let size = Size::new(3, 1);
         let canvas = Canvas::from_picture(size, vec![[0.0; 3]; 3]);
-        let mut front = Front::new(1);
-        observe(&mut front, &canvas, found(1, Time::from_secs(1.0), 0.1));
+        let mut front = Fronts::new(1);
+        front.observe(&canvas, found(1, Time::from_secs(1.0), 0.1));
         front.traced(canvas.traced().place(0));
         assert_eq!(followed(&mut front, &canvas), [2]);
     }
@@ -333,8 +361,8 @@ mod tests {
         {
             let canvas = Canvas::from_picture(size, vec![[0.0; 3]; size.pixels()]);
             for pixel in 0..size.pixels() as u32 {
-                let mut front = Front::new(canvas.traced().grid().len());
-                observe(&mut front, &canvas, found(pixel, now, 0.1));
+                let mut front = Fronts::new(canvas.traced().grid().len());
+                front.observe(&canvas, found(pixel, now, 0.1));
                 let near = |other: &u32| {
                     let ((x, y), (u, v)) = (size.xy(pixel), size.xy(*other));
                     *other != pixel && x.abs_diff(u) < 2 && y.abs_diff(v) < 2
@@ -348,27 +376,28 @@ mod tests {
     #[test]
     fn late_looks_begin_no_fronts() {
         let canvas = Canvas::from_picture(Size::new(3, 1), vec![[0.0; 3]; 3]);
-        let (mut front, grid) = (Front::new(1), canvas.traced().grid());
+        let (mut front, grid) = (Fronts::new(1), canvas.traced().grid());
         let observed = found(1, Time::from_secs(1.0), 0.1);
-        front.observe(&[observed], &[grid.place(1)], &canvas, |place| place == grid.place(1));
+        front.1.set_why(grid.place(1), Why::Late);
+        front.observe(&canvas, observed);
         assert!(followed(&mut front, &canvas).is_empty());
     }
 
     #[test]
     fn where_all_fronts_are_followed_younger_neighbours_are_looked_at_again() {
         let mut canvas = Canvas::from_picture(Size::new(3, 1), vec![[0.0; 3]; 3]);
-        let mut front = Front::new(1);
+        let mut front = Fronts::new(1);
         let now = Time::from_secs(1.0);
         (0..3).for_each(|pixel| _ = canvas.replace(pixel, Time::from_secs(0.995), [0.0; 3]));
-        let next = |front: &mut Front| {
-            observe(front, &canvas, found(1, now, 0.1));
+        let next = |front: &mut Fronts| {
+            front.observe(&canvas, found(1, now, 0.1));
             followed(front, &canvas).len()
         };
         assert_eq!(next(&mut front), 0, "5 ms are young at first");
         let millis = |millis: u64| Time(millis * 1_000_000);
-        (1..101).for_each(|time| front.adapt(millis(time), true));
+        (1..101).for_each(|time| front.0.adapt(millis(time), true));
         assert_eq!(next(&mut front), 2);
-        (101..201).for_each(|time| front.adapt(millis(time), false));
+        (101..201).for_each(|time| front.0.adapt(millis(time), false));
         assert_eq!(next(&mut front), 0, "and again where fronts have to wait");
     }
 
@@ -376,22 +405,23 @@ mod tests {
     fn who_has_no_room_waits_in_front_and_suspects_are_looked_at_in_any_case() {
         let size = Size::new(16, 8);
         let canvas = Canvas::from_picture(size, vec![[0.0; 3]; size.pixels()]);
-        let (mut front, now) = (Front::new(2), Time::from_secs(1.0));
-        observe(&mut front, &canvas, found(2, now, 0.1));
-        front.suspect(canvas.traced().grid().place(2));
-        observe(&mut front, &canvas, found(12, now, 0.1));
+        let (mut front, now) = (Fronts::new(2), Time::from_secs(1.0));
+        front.observe(&canvas, found(2, now, 0.1));
+        front.0.suspect(&mut front.1, canvas.traced().grid().place(2));
+        front.observe(&canvas, found(12, now, 0.1));
         // Traced just now: only as a suspect is it looked at.
         front.traced(canvas.traced().place(2));
         let mut seen = Vec::new();
-        let all = front.follow(canvas.traced().grid(), |tile, pixels| {
+        let Fronts(waiting, tiles) = &mut front;
+        let all = waiting.follow(tiles, canvas.traced().grid(), |tile, pixels| {
             seen.push((tile, pixels));
-            pixels & !0b10
+            [pixels & 0b10, pixels & !0b10]
         });
         assert!(!all && seen == [(0, 0b1110_0000_1110)], "{seen:?}");
         front.traced(canvas.traced().place(3));
         assert_eq!(followed(&mut front, &canvas), [2, 11, 13, 17, 18, 19, 27, 28, 29]);
-        observe(&mut front, &canvas, found(12, now, 0.1));
-        front.clear();
+        front.observe(&canvas, found(12, now, 0.1));
+        front.0.clear(&mut front.1);
         assert_eq!(followed(&mut front, &canvas), [0u32; 0]);
     }
 }

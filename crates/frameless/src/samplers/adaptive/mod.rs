@@ -21,6 +21,7 @@ mod order;
 mod refine;
 mod shares;
 mod stage;
+mod tiles;
 mod weights;
 mod why;
 
@@ -35,8 +36,9 @@ use front::Front;
 use late::Late;
 use refine::Refine;
 pub use stage::AdaptiveStage;
+use tiles::Tiles;
 use weights::TileWeights;
-use why::{Reasons, Why};
+use why::Why;
 
 /// Side of a tile, as a power of two: 8 pixels.
 const TILE_BITS: u32 = 3;
@@ -51,8 +53,10 @@ const HOT_RATE: f32 = 0.01;
 /// Where this part of the tiles is hot fronts begin to lose their share; at twice as many they have none.
 const HOT_PART: f32 = 0.2;
 
-/// How many pixels ahead of the one at hand the next is fetched from memory: enough for a few dozen nanoseconds each.
+/// How many holes ahead of the one at hand the next is fetched from memory: enough for a few dozen nanoseconds each.
 const AHEAD: usize = 12;
+/// What so many observations change is fetched at once.
+const FEW: usize = 64;
 
 /// The default of [`Sampler::set_temporal`].
 pub(crate) const DEFAULT_TEMPORAL: f32 = 0.5;
@@ -70,6 +74,7 @@ pub struct Adaptive {
 struct State {
     generation: u32,
     rates: Rates,
+    tiles: Tiles,
     credit: Credit,
     front: Front,
     late: Late,
@@ -84,10 +89,6 @@ struct State {
     later_holes: VecDeque<u32>,
     /// Samples given out too few.
     owed: f32,
-    /// Why each pixel was asked for last.
-    why: Reasons,
-    /// Of the observations at hand.
-    places: Vec<Place>,
 }
 
 impl Adaptive {
@@ -111,13 +112,14 @@ impl State {
         rng: &mut Rng,
     ) -> State {
         let grid = TileGrid::new(canvas.size(), 1 << TILE_BITS);
+        let mut tiles = Tiles::new(grid.len());
         let mut state = State {
             generation: canvas.generation(),
-            credit: Credit::new(grid.len(), without, rng),
+            credit: Credit::new(&mut tiles, grid.len(), without, rng),
             refine: Refine::new(&grid, rng),
             weights: TileWeights::new(weights, &grid),
-            front: Front::new(grid.len()),
-            why: Reasons::new(grid.len()),
+            front: Front::new(),
+            tiles,
             rates: Rates::new(grid),
             late: Late::new(),
             front_share: FRONT_SHARE,
@@ -126,7 +128,6 @@ impl State {
             next_hole: 0,
             later_holes: VecDeque::new(),
             owed: 0.0,
-            places: Vec::new(),
         };
         state.weigh_all();
         state
@@ -147,11 +148,11 @@ impl State {
         if self.weights.look(canvas, &self.rates.grid) {
             self.weigh_all();
         }
-        self.refine.look(canvas, &self.rates, |tile| self.weights.of_tile(tile));
+        self.refine.look(canvas, &self.rates, &self.tiles, |tile| self.weights.of_tile(tile));
     }
 
     fn take(&mut self, pixel: u32, why: Why, requests: &mut Vec<Request>) {
-        self.why.set(self.rates.grid.place(pixel), why);
+        self.tiles.set_why(self.rates.grid.place(pixel), why);
         requests.push(Request::centre(pixel));
     }
 
@@ -189,13 +190,13 @@ impl State {
         self.front_share =
             wanted(temporal) * FRONT_SHARE * (2.0 - hot_part / HOT_PART).clamp(0.0, 1.0);
         if self.front_share == 0.0 {
-            self.front.clear();
+            self.front.clear(&mut self.tiles);
             return;
         }
         let end = requests.len() + (self.front_share * rest as f32) as usize;
-        let State { front, weights, rates, why, .. } = self;
+        let State { front, tiles, weights, rates, .. } = self;
         let grid = &rates.grid;
-        let all_followed = front.follow(grid, |tile, mut pixels| {
+        let all_followed = front.follow(tiles, grid, |tile, mut pixels| {
             let (corner, mut taken) = (grid.corner(tile), 0);
             while pixels != 0 && requests.len() < end {
                 let bit = pixels & pixels.wrapping_neg();
@@ -206,8 +207,7 @@ impl State {
                     requests.push(Request::centre(pixel));
                 }
             }
-            why.set_all(tile, taken, Why::Front);
-            pixels
+            [taken, pixels]
         });
         front.adapt(now, all_followed);
     }
@@ -221,10 +221,10 @@ impl State {
     ) {
         // As fronts: where everything changes, edges of shadows are not what is wrong most.
         let wanted = self.front_share / FRONT_SHARE;
-        let State { late, weights, rates, why, .. } = self;
+        let State { late, weights, rates, tiles, .. } = self;
         late.choose(now, canvas, rest, wanted, |pixel| {
             if weights.lets_pass(&rates.grid, pixel) {
-                why.set(rates.grid.place(pixel), Why::Late);
+                tiles.set_why(rates.grid.place(pixel), Why::Late);
                 requests.push(Request::centre(pixel));
             }
         });
@@ -238,42 +238,51 @@ fn wanted(temporal: f32) -> f32 {
 
 /// Learning.
 impl State {
-    /// Begin to fetch what an observation will change; returns where it is.
+    /// Begin to fetch what an observation will change.
     #[inline]
-    fn fetch(&self, observed: &Observation) -> Place {
-        let place = self.rates.grid.place(observed.pixel);
-        let tile = place.tile();
+    fn fetch(&self, observed: &Observation, tile: usize) {
         if observed.refinement.is_some() {
             self.refine.prefetch(tile);
-            return place;
+            return;
         }
-        self.why.prefetch(tile);
-        self.front.prefetch(tile);
+        self.tiles.prefetch(tile);
         self.rates.prefetch(tile);
         self.credit.prefetch(tile);
-        place
     }
 
     fn observe_refinement(&mut self, place: Place, n: u16, refinement: &Refinement) {
         let tile = place.tile();
         self.refine.observe(tile, n, refinement, self.weights.of_tile(tile));
         if refinement.suspect {
-            self.front.suspect(place);
+            self.front.suspect(&mut self.tiles, place);
         }
     }
 
     #[inline]
-    fn observe_change(&mut self, observed: &Observation, place: Place) {
-        let weight = match self.why.of(place) {
+    fn observe_sample(&mut self, observed: &Observation, place: Place) {
+        let number = place.tile();
+        let tile = self.tiles.of_mut(number);
+        tile.front.traced(place.within());
+        if !observed.known {
+            return;
+        }
+        let why = tile.reasons.of(place.within());
+        self.front.hear(observed, place, why);
+        let weight = match why {
             Why::Tile => 1.0,
             Why::Front => 0.5,
             Why::Hole | Why::Late => return,
         };
-        let tile = place.tile();
-        let (before, after) = self.rates.observe(tile, observed, weight);
-        self.credit.weigh(tile, self.weights.of_tile(tile), after);
-        self.hot += usize::from(after > HOT_RATE);
-        self.hot -= usize::from(before > HOT_RATE);
+        let age_secs = observed.now.secs_since(observed.previous) as f32;
+        tile.observe_age(age_secs);
+        let after = tile.evidence.observe(observed.change, age_secs, weight);
+        let before = self.rates.set(number, after);
+        // Where nothing ever changes, neither does the tile's share.
+        if after != before {
+            self.credit.weigh(number, self.weights.of_tile(number), after);
+            self.hot += usize::from(after > HOT_RATE);
+            self.hot -= usize::from(before > HOT_RATE);
+        }
     }
 }
 
@@ -303,7 +312,7 @@ impl Sampler for Adaptive {
             let rest = count - (requests.len() - start);
             state.choose_late(now, canvas, rest, requests);
         }
-        let State { credit, refine, rates, why, owed, .. } = state;
+        let State { credit, refine, rates, tiles, owed, .. } = state;
         let left = (count - (requests.len() - start)) as f32;
         let spatial = left * (1.0 - refine.temporal_part(self.temporal));
         if spatial > 0.0 {
@@ -311,9 +320,9 @@ impl Sampler for Adaptive {
         }
         let before = requests.len();
         let rest = count as f32 - (before - start) as f32;
-        credit.draw(now, canvas, rates, [rest + *owed, LEAST_EVEN * left], |place| {
-            why.set(place, Why::Tile);
-            requests.push(Request::centre(rates.grid.pixel(place)));
+        let counts = [rest + *owed, LEAST_EVEN * left];
+        credit.draw(now, canvas, &rates.grid, tiles, counts, |pixel| {
+            requests.push(Request::centre(pixel));
         });
         *owed += rest - (requests.len() - before) as f32;
     }
@@ -323,29 +332,27 @@ impl Sampler for Adaptive {
         else {
             return;
         };
-        // First what will be changed is fetched, all over the picture, then it is changed.
-        let mut places = std::mem::take(&mut state.places);
-        places.clear();
-        places.extend(observations.iter().map(|observed| state.fetch(observed)));
-        for (observed, &place) in observations.iter().zip(&places) {
-            match &observed.refinement {
-                Some(refinement) => {
-                    let n = canvas.samples()[observed.pixel as usize];
-                    state.observe_refinement(place, n, refinement);
-                }
-                None => {
-                    state.front.traced(place);
-                    if observed.known {
-                        state.observe_change(observed, place);
+        state.front.expect(observations.len());
+        let mut places = [Place::default(); FEW];
+        for few in observations.chunks(FEW) {
+            // What will be changed is fetched before, all over the picture.
+            for (place, observed) in places.iter_mut().zip(few) {
+                *place = state.rates.grid.place(observed.pixel);
+                state.fetch(observed, place.tile());
+            }
+            for (&place, observed) in places.iter().zip(few) {
+                match &observed.refinement {
+                    None => state.observe_sample(observed, place),
+                    Some(refinement) => {
+                        let n = canvas.samples()[observed.pixel as usize];
+                        state.observe_refinement(place, n, refinement);
                     }
                 }
             }
         }
         if state.front_share > 0.0 {
-            let State { front, why, .. } = state;
-            front.observe(observations, &places, canvas, |place| why.of(place) == Why::Late);
+            state.front.observe(&mut state.tiles, canvas);
         }
-        state.places = places;
     }
 
     fn set_temporal(&mut self, temporal: f32) {
@@ -602,9 +609,10 @@ mod tests {
                 }
                 sampler.choose(now, &canvas, 100, &mut requests);
             }
-            let why = &sampler.state.as_ref().expect("chosen").why;
+            let tiles = &sampler.state.as_ref().expect("chosen").tiles;
             let grid = canvas.traced().grid();
-            (0..200).filter(|&pixel| why.of(grid.place(pixel)) == Why::Late).count()
+            let why = |place: Place| tiles.of(place.tile()).reasons.of(place.within());
+            (0..200).filter(|&pixel| why(grid.place(pixel)) == Why::Late).count()
         };
         assert!(late(DEFAULT_TEMPORAL) > 150, "{}", late(DEFAULT_TEMPORAL));
         assert_eq!(late(0.0), 0);

@@ -24,6 +24,7 @@
 
 use super::order::Order;
 use super::shares::Shares;
+use super::tiles::Tiles;
 use crate::rates::Rates;
 use crate::tile::{TileGrid, TileRect};
 use crate::{Canvas, Refinement, Request, Rng, wide};
@@ -50,6 +51,8 @@ pub(crate) struct Refine {
     /// By u m σ^(1+b), with u as the even part.
     shares: Shares,
     order: Order,
+    /// Whose turn it is, tile by tile.
+    turns: Vec<u8>,
     /// Per pixel the number of its last sample; empty until samples are wanted.
     index: Vec<u32>,
     /// √E_s.
@@ -179,7 +182,8 @@ impl Refine {
             behind: Behind::Alike,
             variance_sum: f64::from(FIRST_VARIANCE) * tiles as f64,
             shares: Shares::new(tiles, rng),
-            order: Order::new(tiles, rng),
+            order: Order::new(),
+            turns: (0..tiles).map(|_| Order::begin(rng)).collect(),
             index: Vec::new(),
             spatial_error: 0.0,
             temporal_error: 0.0,
@@ -188,7 +192,13 @@ impl Refine {
     }
 
     /// Looks at the canvas anew, after a reconstruction has said what its pixels show.
-    pub(crate) fn look(&mut self, canvas: &Canvas, rates: &Rates, m: impl Fn(usize) -> f32) {
+    pub(crate) fn look(
+        &mut self,
+        canvas: &Canvas,
+        rates: &Rates,
+        tiles: &Tiles,
+        m: impl Fn(usize) -> f32,
+    ) {
         (self.spatial_error, self.temporal_error) = (0.0, 0.0);
         // Nothing is drawn then.
         if canvas.samples_wanted() == 0 {
@@ -206,7 +216,7 @@ impl Refine {
                 Behind::Alike => self.look_at_tile(canvas, rates, tile),
                 Behind::First => self.look_at_endless_tile(canvas, rates, tile),
             };
-            temporal += rates.of_tile(tile) * rates.mean_age_secs(tile) * 0.5;
+            temporal += rates.of_tile(tile) * tiles.of(tile).mean_age_secs * 0.5;
         }
         let per_tile = 1.0 / self.tiles.len() as f32;
         self.spatial_error = (spatial * per_tile * (1.0 / 3.0)).sqrt();
@@ -297,7 +307,8 @@ impl Refine {
         drawn.clear();
         self.shares.draw(count / sum, evenly * count / sum, &mut drawn);
         for &tile in &drawn {
-            let pixel = self.order.peek(grid, tile as usize) as usize;
+            let within = self.order.peek(self.turns[tile as usize]);
+            let pixel = (grid.corner(tile as usize) + grid.step(within)) as usize;
             wide::prefetch(canvas.samples(), pixel);
             wide::prefetch(&self.index, pixel);
         }
@@ -312,8 +323,10 @@ impl Refine {
             Behind::Alike => canvas.samples_wanted() - 1,
             Behind::First => fewest(canvas, &rect)?,
         };
+        let (corner, pixels) = (grid.corner(tile), grid.pixels_of(tile));
         for _ in 0..rect.pixels() {
-            let pixel = grid.pixel(self.order.next(grid, tile));
+            let within = self.order.next(pixels, &mut self.turns[tile]);
+            let pixel = corner + grid.step(within);
             let n = canvas.samples()[pixel as usize];
             if n > 0 && n <= most {
                 let index = &mut self.index[pixel as usize];

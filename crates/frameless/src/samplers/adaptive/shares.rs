@@ -2,19 +2,25 @@
 //!
 //! ```text
 //! got ← got + a · Σ w + b · Σ e     for every block, once per draw of a Σ w + b Σ e tiles
-//! if got ≥ 1:   that many tiles of the block are drawn, got ← 0
+//! if got ≥ g:   that many tiles of the block are drawn, got ← 0
+//! g = number of blocks / 100, in [1, 2]
 //! ```
 //!
-//! So a tile is drawn no later than its block gets its next draw, and what a sweep looks at is a 16th of the tiles: in 4K that takes
-//! as long as in small pictures one over all of them. Blocks that get little are left alone meanwhile, and those drawn from are
-//! looked at once for several tiles.
+//! So what a sweep looks at is a 16th of the tiles: in 4K that takes as long as in small pictures one over all of them. Blocks that get little are
+//! left alone meanwhile, and those drawn from are looked at once for several tiles. In small pictures most blocks have a draw or two per batch
+//! in any case; in large ones they wait for two, since each look at a block waits for memory. More at a time would be faster still, but then what
+//! a block has got is shared out by weights that have changed meanwhile.
 
-use super::block::{BLOCK, Block};
+use super::block::{BLOCK, Block, sum};
 use crate::Rng;
 use crate::wide::{self, F8, Task, Unit};
 
 /// How many blocks are worked on at a time.
 const LANES: usize = 8;
+/// The most draws that a block waits for.
+const MOST_AT_ONCE: f32 = 2.0;
+/// For every so many blocks (102,400 pixels) it waits for one more.
+const BLOCKS_PER_DRAW: f32 = 100.0;
 /// How many blocks ahead of the one at hand the next is fetched.
 const AHEAD: usize = 8;
 
@@ -22,6 +28,10 @@ const AHEAD: usize = 8;
 pub(super) struct Shares {
     tiles: usize,
     blocks: Vec<Block>,
+    /// e of the blocks' tiles; empty: all are 1.
+    evens: Vec<[f32; BLOCK]>,
+    /// 1 for the tiles of the last block that are there.
+    last: [f32; BLOCK],
     /// Of every block, and of some that are not there and have nothing.
     got: Vec<f32>,
     /// Σ w.
@@ -30,6 +40,8 @@ pub(super) struct Shares {
     even: Vec<f32>,
     /// Over all tiles.
     even_sum: f64,
+    /// g.
+    at_once: f32,
     /// Blocks that are drawn from.
     due: Vec<u32>,
 }
@@ -51,11 +63,25 @@ impl Shares {
             blocks[tile / BLOCK].credit[tile % BLOCK] = rng.unit_f32();
         }
         let nothing = vec![0.0; blocks.len().next_multiple_of(LANES)];
-        let got = blocks.iter().map(|_| rng.unit_f32());
+        let at_once = (blocks.len() as f32 / BLOCKS_PER_DRAW).clamp(1.0, MOST_AT_ONCE);
+        let got = blocks.iter().map(|_| at_once * rng.unit_f32());
         let mut got: Vec<f32> = got.collect();
         got.resize(nothing.len(), 0.0);
         let (weight, even) = (nothing.clone(), nothing);
-        Shares { tiles, got, weight, even, even_sum: 0.0, due: Vec::new(), blocks }
+        let in_last = tiles - tiles.saturating_sub(1) / BLOCK * BLOCK;
+        let last = std::array::from_fn(|i| if i < in_last { 1.0 } else { 0.0 });
+        let (evens, due) = (Vec::new(), Vec::new());
+        Shares { tiles, blocks, evens, last, got, weight, even, even_sum: 0.0, at_once, due }
+    }
+
+    /// e of a block's tiles.
+    #[inline(always)]
+    fn even_of(&self, block: usize) -> &[f32; BLOCK] {
+        match self.evens.get(block) {
+            Some(even) => even,
+            None if block + 1 < self.blocks.len() => &[1.0; BLOCK],
+            None => &self.last,
+        }
     }
 
     /// Over all tiles.
@@ -72,12 +98,27 @@ impl Shares {
 
     /// w and e of all tiles are others now, all at least 0.
     pub(super) fn set_all(&mut self, share: impl Fn(usize) -> (f32, f32)) {
+        self.evens.resize(self.blocks.len(), [0.0; BLOCK]);
         for tile in 0..self.tiles {
-            let (block, i) = (&mut self.blocks[tile / BLOCK], tile % BLOCK);
-            (block.weight[i], block.even[i]) = share(tile);
+            let (block, i) = (tile / BLOCK, tile % BLOCK);
+            (self.blocks[block].weight[i], self.evens[block][i]) = share(tile);
         }
+        self.sum_all();
+    }
+
+    /// The same where e of all tiles is 1.
+    pub(super) fn set_weights(&mut self, weight: impl Fn(usize) -> f32) {
+        self.evens.clear();
+        for tile in 0..self.tiles {
+            self.blocks[tile / BLOCK].weight[tile % BLOCK] = weight(tile);
+        }
+        self.sum_all();
+    }
+
+    fn sum_all(&mut self) {
         for (i, block) in self.blocks.iter().enumerate() {
-            (self.weight[i], self.even[i]) = block.sums();
+            self.weight[i] = sum(&block.weight);
+            self.even[i] = sum(self.even_of(i));
         }
         self.even_sum = self.even.iter().map(|&even| f64::from(even)).sum();
     }
@@ -102,8 +143,8 @@ impl Shares {
     /// q of every tile.
     pub(super) fn all(&self, a: f32, b: f32) -> Vec<f32> {
         let q = |tile: usize| {
-            let (block, i) = (&self.blocks[tile / BLOCK], tile % BLOCK);
-            a * block.weight[i] + b * block.even[i]
+            let (block, i) = (tile / BLOCK, tile % BLOCK);
+            a * self.blocks[block].weight[i] + b * self.even_of(block)[i]
         };
         (0..self.tiles).map(q).collect()
     }
@@ -129,16 +170,19 @@ impl Task for Draw<'_> {
         shares.give::<U>(a, b);
         for i in 0..shares.due.len() {
             if let Some(&later) = shares.due.get(i + AHEAD) {
-                let Block { credit, weight, even } = &shares.blocks[later as usize];
-                for numbers in [credit, weight, even] {
-                    wide::prefetch(numbers, 0);
+                let Block { credit, weight } = &shares.blocks[later as usize];
+                wide::prefetch(credit, 0);
+                wide::prefetch(weight, 0);
+                if !shares.evens.is_empty() {
+                    wide::prefetch(&shares.evens, later as usize);
                 }
             }
             let number = shares.due[i];
+            let (even, got) = (*shares.even_of(number as usize), &mut shares.got[number as usize]);
             let block = &mut shares.blocks[number as usize];
-            let got = std::mem::take(&mut shares.got[number as usize]);
-            block.draw::<U>(a, b, got, |tile| tiles.push(number * BLOCK as u32 + tile as u32));
-            shares.weight[number as usize] = block.sums().0;
+            let take = |tile: usize| tiles.push(number * BLOCK as u32 + tile as u32);
+            block.draw::<U>([a, b], &even, std::mem::take(got), take);
+            shares.weight[number as usize] = sum(&block.weight);
         }
     }
 }
@@ -147,13 +191,13 @@ impl Shares {
     /// Gives all blocks what they get, and finds those that are drawn from.
     #[inline(always)]
     fn give<U: Unit>(&mut self, a: f32, b: f32) {
-        let (a, b) = (F8::<U>::splat(a), F8::splat(b));
+        let (a, b, at_once) = (F8::<U>::splat(a), F8::splat(b), F8::splat(self.at_once));
         self.due.clear();
         for first in (0..self.got.len()).step_by(LANES) {
             let gets = a * F8::load(&self.weight, first) + b * F8::load(&self.even, first);
             let got = F8::load(&self.got, first) + gets;
             self.got[first..first + LANES].copy_from_slice(&got.lanes());
-            let mut due = !got.less_than(F8::splat(1.0)).bits() & 255;
+            let mut due = !got.less_than(at_once).bits() & 255;
             while due != 0 {
                 self.due.push(first as u32 + due.trailing_zeros());
                 due &= due - 1;
@@ -247,7 +291,7 @@ mod tests {
         let scratch: f64 = shares.blocks.iter().flat_map(|block| block.weight).map(f64::from).sum();
         assert!((shares.sums().weight / scratch - 1.0).abs() < 1e-6, "{scratch}");
         for (kept, block) in shares.weight.iter().zip(&shares.blocks) {
-            assert!((kept - block.sums().0).abs() < 1e-5, "{kept}, not {}", block.sums().0);
+            assert!((kept - sum(&block.weight)).abs() < 1e-5, "{kept}, not {block:?}");
         }
     }
 

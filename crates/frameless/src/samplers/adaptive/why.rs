@@ -1,8 +1,5 @@
 //! Why each pixel was asked for last: two bits, those of a tile beside each other.
 
-use crate::traced::Place;
-use crate::wide;
-
 /// Who wanted it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Why {
@@ -12,18 +9,15 @@ pub(super) enum Why {
     Late = 3,
 }
 
-/// One of every pixel: of each tile the lower bits of its 64 pixels, and the upper ones.
-pub(super) struct Reasons(Vec<[u64; 2]>);
+/// One of every pixel of a tile: the lower bits of its 64 pixels, and the upper ones. At first all are for the tile.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Reasons([u64; 2]);
 
 impl Reasons {
-    /// All for their tiles.
-    pub(super) fn new(tiles: usize) -> Reasons {
-        Reasons(vec![[0; 2]; tiles])
-    }
-
+    /// Of the pixel at a place `within` the tile.
     #[inline]
-    pub(super) fn of(&self, place: Place) -> Why {
-        let [low, high] = self.0[place.tile()].map(|bits| bits >> place.within() & 1);
+    pub(super) fn of(self, within: usize) -> Why {
+        let [low, high] = self.0.map(|bits| bits >> within & 1);
         match low | high << 1 {
             0 => Why::Tile,
             1 => Why::Front,
@@ -32,24 +26,13 @@ impl Reasons {
         }
     }
 
+    /// Of all pixels whose bits are set.
     #[inline]
-    pub(super) fn set(&mut self, place: Place, why: Why) {
-        self.set_all(place.tile(), 1 << place.within(), why);
-    }
-
-    /// Of all pixels of a tile whose bits are set.
-    #[inline]
-    pub(super) fn set_all(&mut self, tile: usize, pixels: u64, why: Why) {
+    pub(super) fn set(&mut self, pixels: u64, why: Why) {
         let (low, high) = ((why as u64 & 1).wrapping_neg(), (why as u64 >> 1).wrapping_neg());
-        let [lower, upper] = &mut self.0[tile];
+        let [lower, upper] = &mut self.0;
         *lower = *lower & !pixels | low & pixels;
         *upper = *upper & !pixels | high & pixels;
-    }
-
-    /// Begin to fetch those of a tile.
-    #[inline]
-    pub(super) fn prefetch(&self, tile: usize) {
-        wide::prefetch(&self.0, tile);
     }
 }
 
@@ -59,15 +42,15 @@ mod tests {
 
     #[test]
     fn neighbours_keep_their_own() {
-        let mut reasons = Reasons::new(2);
+        let mut reasons = Reasons::default();
         let all = [Why::Hole, Why::Front, Why::Tile, Why::Late, Why::Front];
         for turn in 0..3 {
             let why = |place: usize| all[(place + turn) % 5];
-            (0..128).for_each(|place| reasons.set(Place(place), why(place)));
-            assert!((0..128).all(|place| reasons.of(Place(place)) == why(place)), "turn {turn}");
+            (0..64).for_each(|place| reasons.set(1 << place, why(place)));
+            assert!((0..64).all(|place| reasons.of(place) == why(place)), "turn {turn}");
         }
-        reasons.set_all(1, 0b101, Why::Late);
-        let after = [64, 65, 66].map(|place| reasons.of(Place(place)));
-        assert_eq!(after, [Why::Late, all[67 % 5], Why::Late]);
+        reasons.set(0b101, Why::Late);
+        let after = [0, 1, 2].map(|place| reasons.of(place));
+        assert_eq!(after, [Why::Late, all[3], Why::Late]);
     }
 }
