@@ -78,10 +78,12 @@ impl Mark {
     }
 }
 
+pub(crate) const HALF_TICKS_PER_SEC: f32 = 2.0 / TICK_SECS;
+
 /// Seconds as half ticks, rounded down.
 #[inline(always)]
 pub(crate) fn half_ticks(secs: f32) -> i32 {
-    (secs * (2.0 / TICK_SECS)) as i32
+    (secs * HALF_TICKS_PER_SEC) as i32
 }
 
 /// The marks of a tile.

@@ -1,6 +1,6 @@
 //! Which pixel of a tile is next: Bayer's order, but those that are young for their tile are passed over.
 
-use crate::traced::{Mark, TILE_PIXELS, TileMarks, half_ticks};
+use crate::traced::{HALF_TICKS_PER_SEC, Mark, TILE_PIXELS, TileMarks};
 use crate::{Rng, bayer};
 
 /// Pixels looked at before one is taken that is younger than half the mean age of its tile.
@@ -63,12 +63,12 @@ impl Order {
         TileMarks(marks): &TileMarks,
         pixels: u64,
         turn: &mut u8,
-        enough: i32,
+        enough: f32,
     ) -> usize {
         let mut oldest = self.next(pixels, turn);
         let mut oldest_age = Mark(marks[oldest]).age(now);
         for _ in 1..TRIES {
-            if oldest_age > enough {
+            if oldest_age as f32 > enough {
                 break;
             }
             let within = self.next(pixels, turn);
@@ -83,8 +83,9 @@ impl Order {
 
 /// The age from which on pixels of a tile are old enough, in half ticks: half their mean age.
 #[inline]
-pub(super) fn enough(mean_age_secs: f32) -> i32 {
-    half_ticks(0.5 * mean_age_secs)
+pub(super) fn enough(mean_age_secs: f32) -> f32 {
+    // Not as a whole number: to be made one it would have to be asked whether it is one.
+    0.5 * HALF_TICKS_PER_SEC * mean_age_secs
 }
 
 #[cfg(test)]
