@@ -7,7 +7,8 @@
 //! than 1/512 of what they lead to, and those after the 32nd branch, are left out.
 //!
 //! The camera does not see the backs of single-sided surfaces, as in viewers that rasterise. All other rays meet both sides of every
-//! surface, the normal turned towards where they come from: a back that is culled would let light through walls.
+//! surface, the normal turned towards where they come from: a back that is culled would let light through walls. Two surfaces close
+//! to each other are an exception, see [`crate::sheets`].
 
 use frameless::Surface;
 use frameless_scene::{AlphaMode, Material};
@@ -187,12 +188,15 @@ impl World {
         stack: &mut Stack,
         probe: &mut impl Probe,
     ) -> bool {
-        let Leg { ray, cone, depth, .. } = picture.leg;
+        let Leg { ray, cone, depth, culls, .. } = picture.leg;
         probe.note(|| format!("ray {depth}: from {:.5} along {:.5}", ray.origin, ray.direction));
         let Some(hit) = met else { return self.see_sky(picture, probe) };
         probe.note(|| format!("  {hit:?}"));
-        let point = &Point::new(self, moment, &ray, hit, cone);
-        let met = (hit, point);
+        let mut point = Point::new(self, moment, &ray, hit, cone);
+        if culls {
+            self.lift_onto_back(moment, (&ray, cone), &mut point, stack, probe);
+        }
+        let (point, met) = (&point, (hit, &point));
         match self.meet(picture, met, settings, probe) {
             Seen::All { goes_on } => goes_on,
             Seen::Lit(lit) => {

@@ -304,7 +304,7 @@ pub(crate) fn attenuation(sigma: Vec3A, way_m: f32) -> Vec3A {
 
 /// Whether the camera passes the surface from behind. The back of what encloses a volume is the way out of it, which is seen whatever the
 /// file says.
-fn has_no_back(world: &World, hit: &Hit) -> bool {
+pub(crate) fn has_no_back(world: &World, hit: &Hit) -> bool {
     let encloses = |material: &Material| {
         let layers = material.layers.as_ref();
         layers.is_some_and(|layers| layers.volume.is_some() && layers.transmission > 0.0)

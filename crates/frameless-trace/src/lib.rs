@@ -44,6 +44,7 @@ mod render;
 mod sah;
 mod shares;
 mod sheen;
+mod sheets;
 mod sift;
 mod sphere;
 mod standing;

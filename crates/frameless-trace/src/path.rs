@@ -77,13 +77,16 @@ impl World {
                 first.see(self, || sky_surface(&ray), throughput);
                 break;
             };
-            let point = Point::new(self, moment, &ray, &hit, cone);
+            let mut point = Point::new(self, moment, &ray, &hit, cone);
             probe.note(|| format!("  {hit:?}"));
             if depth == 0 && !culls && self.is_culled(&hit, &point) {
                 probe.note(|| "  the back of what is single-sided, which the camera passes".into());
                 culls = true;
                 met = self.behind_back(moment, &ray, || numbers.chance(depth), stack);
                 continue;
+            }
+            if culls {
+                self.lift_onto_back(moment, (&ray, cone), &mut point, stack, probe);
             }
             let material = &self.scene().materials[point.material as usize];
             // Directions have unit length.

@@ -176,6 +176,42 @@ fn the_camera_passes_the_back_of_a_single_sided_surface_and_light_does_not() {
     assert_eq!((rgb[0] > 0.0, surface.object), (true, 1));
 }
 
+/// The tiles of TextureSettingsTest and NegativeScaleTest: two single-sided squares face to face, the upper one seen through. So close, they
+/// are one sheet; farther apart the upper one keeps the light from the lower, and so it does where it hangs before a wall at right angles.
+#[test]
+fn what_lies_close_behind_a_back_is_lit_as_if_nothing_were_before_it() {
+    let seen = |apart: f32, is_turned: bool, integrator| {
+        let mut scene = matte_floor(0.8);
+        scene.sky = [Vec3::ONE; 2];
+        let white = scenes::add_material(&mut scene, Vec3::splat(0.8), 0.0, 1.0);
+        scene.materials[white as usize].specular = 0.0;
+        scene.materials[0].specular = 0.0;
+        let rotation = Quat::from_rotation_x(if is_turned { 0.6 * PI } else { PI });
+        let place = Transform { rotation, ..scenes::at(0.0, apart, 0.0) };
+        scenes::add(&mut scene, scenes::floor(1.0, 0.0, white), place);
+        scenes::add_point_light(&mut scene, Vec3::new(0.0, 6.0, 0.0), 36.0 * PI);
+        let world = World::new(Arc::new(scene));
+        let world_from_camera = look_at(Vec3::new(0.0, 4.0, 0.1), Vec3::ZERO, Vec3::Z);
+        let projection = Projection::Perspective { yfov_rad: 0.01 };
+        let (settings, moment) =
+            (Settings { integrator, ..Settings::default() }, world.moment(0.0));
+        let sample = |k| {
+            let view = View { world_from_camera, projection };
+            let request = Request { sample_index: k, ..Request::centre(0) };
+            let (rgb, surface) = world.trace(&moment, &view, Size::new(1, 1), &request, &settings);
+            assert_eq!(surface.object, 0, "the floor is what is seen");
+            rgb[0]
+        };
+        (0..1024).map(sample).sum::<f32>() / 1024.0
+    };
+    // Of the light 36 π / 6² · 0.8 / π, and with paths 0.8 of the sky.
+    for (integrator, want) in [(Integrator::Direct, 0.8), (Integrator::Path, 1.6)] {
+        assert_near(seen(0.1, false, integrator), want, 0.01);
+        assert!(seen(1.0, false, integrator) < 0.7 * want);
+        assert!(seen(0.1, true, integrator) < 0.7 * want);
+    }
+}
+
 #[test]
 fn a_mirror_shows_what_is_opposite() {
     let mut scene = matte_floor(1.0);

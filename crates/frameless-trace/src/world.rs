@@ -4,7 +4,7 @@ use std::f32::consts::FRAC_1_PI;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
-use frameless_scene::{Geometry, Mesh, Scene};
+use frameless_scene::{Bounds, Geometry, Mesh, Scene};
 use glam::{Affine3A, Vec3A};
 use rayon::prelude::*;
 
@@ -36,6 +36,8 @@ pub struct World {
     pub(crate) holes: Vec<bool>,
     /// Whether any has.
     pub(crate) has_holes: bool,
+    /// Per geometry: its box at rest.
+    pub(crate) boxes: Vec<Option<Bounds>>,
     pub(crate) mirrors: Mirrors,
     pub(crate) emitters: Emitters,
     /// The scene's environment.
@@ -74,6 +76,7 @@ impl World {
             holes,
             blas: blas.collect(),
             standing,
+            boxes: scene.geometries.par_iter().map(Geometry::bounds).collect(),
             deforming: Deforming::all(&scene),
             mirrors: Mirrors::new(&scene),
             emitters: Emitters::new(&scene),
