@@ -39,6 +39,23 @@ impl Scene {
         self.compose_world(state);
     }
 
+    /// Per node: whether the animation moves it or what it hangs on.
+    pub fn moving_nodes(&self) -> Vec<bool> {
+        let mut moves = vec![false; self.nodes.len()];
+        for channel in &self.animation.channels {
+            match channel.target {
+                Target::Translation(node) | Target::Rotation(node) | Target::Scale(node) => {
+                    moves[node as usize] = true;
+                }
+                Target::LightIntensity(_) | Target::MorphWeight(_) => {}
+            }
+        }
+        for (index, node) in self.nodes.iter().enumerate() {
+            moves[index] |= node.parent.is_some_and(|parent| moves[parent as usize]);
+        }
+        moves
+    }
+
     fn apply_animation(&self, secs: f64, state: &mut State) {
         if self.animation.duration_secs <= 0.0 {
             return;

@@ -11,7 +11,7 @@
 
 use std::marker::PhantomData;
 
-use frameless_scene::{Geometry, Instance, Mesh, Scene, Target};
+use frameless_scene::{Geometry, Instance, Mesh, Scene};
 use glam::Affine3A;
 
 use crate::build::{Blas, Triangles, corners_at};
@@ -163,7 +163,7 @@ impl Standing {
 fn places(scene: &Scene) -> Vec<Option<Affine3A>> {
     let mut uses = vec![0u32; scene.geometries.len()];
     scene.instances.iter().for_each(|instance| uses[instance.geometry as usize] += 1);
-    let (moves, state) = (moving_nodes(scene), scene.state_at(0.0));
+    let (moves, state) = (scene.moving_nodes(), scene.state_at(0.0));
     let place = |(index, instance): (usize, &Instance)| {
         let stands = !moves[instance.node as usize]
             && uses[instance.geometry as usize] == 1
@@ -177,23 +177,6 @@ fn places(scene: &Scene) -> Vec<Option<Affine3A>> {
         (stands && is_sane).then_some(place)
     };
     scene.instances.iter().enumerate().map(place).collect()
-}
-
-/// Per node: whether the animation moves it or what it hangs on.
-pub(crate) fn moving_nodes(scene: &Scene) -> Vec<bool> {
-    let mut moves = vec![false; scene.nodes.len()];
-    for channel in &scene.animation.channels {
-        match channel.target {
-            Target::Translation(node) | Target::Rotation(node) | Target::Scale(node) => {
-                moves[node as usize] = true;
-            }
-            Target::LightIntensity(_) | Target::MorphWeight(_) => {}
-        }
-    }
-    for (index, node) in scene.nodes.iter().enumerate() {
-        moves[index] |= node.parent.is_some_and(|parent| moves[parent as usize]);
-    }
-    moves
 }
 
 fn mesh_of(scene: &Scene, instance: usize) -> Option<&Mesh> {

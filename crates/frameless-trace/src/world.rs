@@ -15,7 +15,7 @@ use crate::holes::may_have_holes;
 use crate::images::Mirrors;
 use crate::kernel::Isa;
 use crate::matter::is_plain;
-use crate::standing::{Standing, moving_nodes};
+use crate::standing::Standing;
 use crate::surroundings::Surroundings;
 use crate::texture::Copies;
 
@@ -140,7 +140,7 @@ impl World {
             return false;
         }
         let deforming: usize = self.deforming.iter().map(Deforming::triangles).sum();
-        let moves = moving_nodes(&self.scene);
+        let moves = self.scene.moving_nodes();
         let moving = self.scene.instances.iter().filter(|one| moves[one.node as usize]).count();
         deforming + PER_INSTANCE * moving > MANY
     }

@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::path::Path;
 
-use crate::{Contents, Geometry, Material, Scene, Target, Value};
+use crate::{Contents, Geometry, Material, Scene, State, Target, Value};
 
 use super::accessor::parse_accessors;
 use super::animation::{Nodes, load_animation};
@@ -25,6 +25,7 @@ use super::mesh::load_meshes;
 use super::node::{Hierarchy, load_nodes, node_called};
 use super::skin::load_skins;
 use super::texture::Textures;
+use super::twins::leave_out_twins;
 use super::uri::read_file;
 use super::warnings::Warnings;
 
@@ -140,7 +141,9 @@ fn build(document: &mut Document<'_>, choice: &Choice) -> Result<Scene, Fault> {
     scene.animation = load_animation(document, &nodes, &choice.animation, &mut scene.contents)?;
     scene.nodes.clone_from(&hierarchy.nodes);
     set_still_pose(&mut scene);
-    refuse_infinite_places(&scene, &hierarchy)?;
+    let state = scene.state_at(0.0);
+    refuse_infinite_places(&state, &hierarchy)?;
+    leave_out_twins(&mut scene, &state, &mut document.warnings);
     Ok(scene)
 }
 
@@ -183,9 +186,8 @@ fn set_still_pose(scene: &mut Scene) {
 }
 
 /// Finite numbers multiply to infinite ones down a chain of nodes.
-fn refuse_infinite_places(scene: &Scene, hierarchy: &Hierarchy) -> Result<(), Fault> {
-    let places = scene.state_at(0.0).world_from_node;
-    match places.iter().position(|place| !place.is_finite()) {
+fn refuse_infinite_places(state: &State, hierarchy: &Hierarchy) -> Result<(), Fault> {
+    match state.world_from_node.iter().position(|place| !place.is_finite()) {
         None => Ok(()),
         Some(node) => {
             let pointer = format!("/nodes/{}", hierarchy.file_index[node]);

@@ -95,6 +95,10 @@ fn instances_of_one_mesh_have_skins_of_their_own() {
     maker.push("nodes", json!({"translation": [1.0, 0.0, 0.0]}));
     maker.push("nodes", json!({"mesh": 0, "translation": [9.0, 0.0, 0.0]}));
     maker.push("nodes", json!({"mesh": 0, "skin": 0}));
+    // It moves later: else the last would be left out as the first one's twin.
+    let (times, place) = (maker.floats("SCALAR", &[0.0, 1.0]), maker.floats("VEC3", &[0.0; 6]));
+    maker.json["animations"] = json!([{"samplers": [{"input": times, "output": place}],
+        "channels": [{"sampler": 0, "target": {"node": 1, "path": "translation"}}]}]);
     let scene = maker.load();
     assert_eq!((scene.geometries.len(), scene.instances.len(), scene.skins.len()), (1, 4, 2));
     assert_eq!(deformed(&scene, 0, 0.0), deformed(&scene, 2, 0.0));

@@ -236,7 +236,7 @@ fn a_mesh_at_two_nodes_is_one_geometry_and_one_at_none_is_dropped() {
     );
     let unused = maker.json["meshes"][0].clone();
     maker.json["meshes"].as_array_mut().unwrap().insert(0, unused);
-    maker.json["nodes"] = json!([{"mesh": 1}, {}, {"mesh": 1}]);
+    maker.json["nodes"] = json!([{"mesh": 1}, {}, {"mesh": 1, "translation": [1, 0, 0]}]);
     let scene = maker.load();
     assert_eq!(scene.geometries.len(), 1);
     let places: Vec<_> = scene.instances.iter().map(|i| (i.node, i.geometry)).collect();

@@ -218,3 +218,49 @@ fn an_empty_file_is_a_scene_that_says_so() {
     assert_eq!(scene.warnings, ["the file has nothing to draw"]);
     assert_eq!(scene.cameras.len(), 1);
 }
+
+/// A square at every node, and the material that it has.
+fn squares(nodes: serde_json::Value, material: serde_json::Value) -> Maker {
+    let mut maker = Maker::with_primitive(
+        |maker| json!({"attributes": {"POSITION": maker.floats("VEC3", &SQUARE)}, "mode": 6, "material": 0}),
+    );
+    maker.json["materials"] = json!([material]);
+    maker.json["nodes"] = nodes;
+    maker
+}
+
+/// How many squares are drawn, and what is said of the others.
+fn drawn(nodes: serde_json::Value, material: serde_json::Value) -> (usize, Option<String>) {
+    let scene = squares(nodes, material).load();
+    let said = scene.warnings.iter().find(|warning| warning.contains("left out"));
+    (scene.instances.len(), said.cloned())
+}
+
+#[test]
+fn what_stands_in_the_same_place_many_times_is_drawn_once() {
+    let same = json!({"mesh": 0, "translation": [1, 2, 3]});
+    let other = json!({"mesh": 0, "translation": [1, 2, 3.000001]});
+    let nodes = json!([same, same, other, {"mesh": 0, "translation": [1, 2, 3], "scale": [1, 1, 1]}, other]);
+    let said = "3 instances were left out, as the same mesh stands in the same place already";
+    assert_eq!(drawn(nodes, json!({})), (2, Some(said.into())));
+    // As many veils as are seen one behind the other.
+    let veil = json!({"alphaMode": "BLEND"});
+    let veils = drawn(json!(vec![same.clone(); 20]), veil.clone());
+    assert_eq!((veils.0, veils.1.is_some()), (16, true));
+    assert_eq!(drawn(json!(vec![same; 16]), veil), (16, None));
+}
+
+#[test]
+fn what_moves_is_nobodys_twin() {
+    let same = json!({"mesh": 0});
+    // The first stands in the others' place only when the animation begins.
+    let mut maker = squares(json!([same, same, same]), json!({}));
+    let times = maker.floats("SCALAR", &[0.0, 1.0]);
+    let places = maker.floats("VEC3", &[0.0, 0.0, 0.0, 5.0, 0.0, 0.0]);
+    maker.json["animations"] = json!([{
+        "samplers": [{"input": times, "output": places}],
+        "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]}]);
+    let scene = maker.load();
+    let nodes: Vec<u32> = scene.instances.iter().map(|instance| instance.node).collect();
+    assert_eq!(nodes, [0, 1]);
+}
