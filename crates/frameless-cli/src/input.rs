@@ -4,12 +4,11 @@ use std::path::Path;
 
 use anyhow::anyhow;
 use frameless_scene::{
-    Animation, AnimationChoice, BUILTIN_NAMES, Choice, Environment, Limits, LoadError, Problem,
-    Scene, load_environment,
+    Animation, AnimationChoice, BUILTIN_NAMES, Choice, Environment, Limits, Scene, load_environment,
 };
 use frameless_session::Opener;
 
-use crate::args::{ChoiceArgs, LimitArgs, OpenArgs};
+use crate::args::{ChoiceArgs, OpenArgs};
 use crate::failure::Failure;
 
 /// How the user wants scenes to be opened.
@@ -18,7 +17,7 @@ fn opener(args: &OpenArgs) -> Result<Opener, Failure> {
     let Some(file) = &args.environment.file else {
         return Ok(Opener { limits, environment: None });
     };
-    let picture = load_environment(file, &limits).map_err(refused)?;
+    let picture = load_environment(file, &limits).map_err(Failure::bad_input)?;
     // Turned by whole turns, a large angle is the same in single precision.
     let rotation_rad = (args.environment.rotation_deg % 360.0).to_radians() as f32;
     let strength = args.environment.strength.min(f64::from(f32::MAX)) as f32;
@@ -46,19 +45,7 @@ pub(crate) fn scene(name: &str, choice: &ChoiceArgs, limits: &Limits) -> Result<
     }
     let animation = choice.animation.clone().unwrap_or_default();
     let choice = Choice { scene: choice.file_scene.clone(), animation };
-    frameless_scene::load_chosen(path, &choice, limits).map_err(refused)
-}
-
-/// With the flag that raises the limit, if a file is refused because of one.
-fn refused(error: LoadError) -> Failure {
-    let flag = match &error.problem {
-        Problem::Limit { what, .. } => LimitArgs::flag_of(what),
-        _ => None,
-    };
-    match flag {
-        Some(flag) => Failure::bad_input(anyhow!("{error}; {flag} raises it")),
-        None => Failure::bad_input(error),
-    }
+    frameless_scene::load_chosen(path, &choice, limits).map_err(Failure::bad_input)
 }
 
 /// A built-in scene has no parts; it may be held still.

@@ -104,21 +104,6 @@ impl Default for LimitArgs {
 }
 
 impl LimitArgs {
-    /// The flag that raises the limit of which an error speaks, if there is one.
-    pub(crate) fn flag_of(what: &str) -> Option<&'static str> {
-        Some(match what {
-            "decoded bytes" | "bytes of file" | "keyframes" | "JSON values" => "--max-memory",
-            "triangles" | "vertices" => "--max-triangles",
-            "pixels in one image" | "pixels in all images" | "pixels in images of few bytes" => {
-                "--max-texture-pixels"
-            }
-            "nodes" => "--max-nodes",
-            "levels of nodes" => "--max-nesting",
-            "instances" => "--max-instances",
-            _ => return None,
-        })
-    }
-
     /// Those that follow from others are raised with them.
     pub(crate) fn limits(&self) -> Limits {
         /// No key and no value in a file takes less.

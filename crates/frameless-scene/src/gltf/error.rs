@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use super::limits::flag_of;
+
 /// A file that could not be loaded: which one, where in it, and what is wrong there.
 #[derive(Debug, thiserror::Error)]
 #[error("{file}: {place}: {problem}")]
@@ -55,7 +57,7 @@ pub enum Problem {
         came: String,
     },
     /// More than [`crate::Limits`] allow.
-    #[error("{came} {what}, more than the limit of {limit}")]
+    #[error("{came} {what}, more than the limit of {limit}{}", how_to_raise(what))]
     Limit {
         /// The thing that is counted.
         what: &'static str,
@@ -88,6 +90,11 @@ impl Fault {
     pub(super) fn in_file(self, file: &str) -> LoadError {
         LoadError { file: file.to_owned(), place: self.place, problem: self.problem }
     }
+}
+
+/// Names the flag of the program `frameless` that raises the limit, if there is one.
+fn how_to_raise(what: &str) -> String {
+    flag_of(what).map_or(String::new(), |flag| format!("; {flag} raises it"))
 }
 
 fn unexpected(wanted: impl fmt::Display, came: impl fmt::Display) -> Problem {

@@ -105,18 +105,18 @@ impl Placer<'_> {
             Some(places) => add_nodes(&places, index, node, document, hierarchy)?,
             None => vec![index],
         };
+        let all = (scene.instances.len() + places.len()) as u64;
+        within(all, document.budget.limits.instances, "instances", node.pointer())?;
         let size = (mesh.positions.len(), mesh.triangles.len());
         let geometry = number(&mut self.geometry_of, mesh_index, &mut self.geometries);
         let skin = skin.map(|skin| number(&mut self.skin_of, skin, &mut self.skins));
         for node_index in places {
             scene.instances.push(Instance { node: node_index, geometry });
-            let count = scene.instances.len() as u64;
-            within(count, document.budget.limits.instances, "instances", node.pointer())?;
             if skin.is_some() || !weights.is_empty() {
                 // Every instance that deforms has vertices and triangles of its own.
                 document.budget.add_vertices(node.pointer(), size.0)?;
                 document.budget.add_triangles(node.pointer(), size.1)?;
-                let (instance, weights) = (count as u32 - 1, weights.clone());
+                let (instance, weights) = (scene.instances.len() as u32 - 1, weights.clone());
                 scene.deformations.push(Deformation { instance, skin, weights });
             }
         }
@@ -234,8 +234,6 @@ fn add_nodes(
     document: &mut Document<'_>,
     hierarchy: &mut Hierarchy,
 ) -> Result<Vec<u32>, Fault> {
-    let all = (hierarchy.nodes.len() + places.len()) as u64;
-    within(all, document.budget.limits.nodes, "nodes", node.pointer())?;
     let mut indices = Vec::with_capacity(places.len());
     for &rest in places {
         if !(rest.translation.is_finite() && rest.scale.is_finite()) {

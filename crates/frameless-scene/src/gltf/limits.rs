@@ -140,6 +140,21 @@ pub(crate) fn check_environment_size(
         .map_err(|fault| fault.problem)
 }
 
+/// The flag of the program `frameless` that raises the limit of what an error speaks of, if there is one.
+pub(super) fn flag_of(what: &str) -> Option<&'static str> {
+    Some(match what {
+        "decoded bytes" | "bytes of file" | "keyframes" | "JSON values" => "--max-memory",
+        "triangles" | "vertices" => "--max-triangles",
+        "pixels in one image" | "pixels in all images" | "pixels in images of few bytes" => {
+            "--max-texture-pixels"
+        }
+        "nodes" => "--max-nodes",
+        "levels of nodes" => "--max-nesting",
+        "instances" => "--max-instances",
+        _ => return None,
+    })
+}
+
 /// Adds `more` to `total` unless that would pass `limit`.
 fn spend(
     total: &mut u64,

@@ -1,6 +1,6 @@
 //! Skins and morph targets: where vertices come to lie, known without running.
 
-use frameless_scene::{Deformed, Interpolation, Problem, Scene, Target};
+use frameless_scene::{Deformed, Interpolation, Limits, Problem, Scene, Target, load_bytes};
 use glam::{Affine3A, Quat, Vec3, Vec4};
 use serde_json::{Value, json};
 
@@ -398,4 +398,29 @@ fn a_mesh_may_stand_at_many_places_of_its_node() {
     assert_close(&[world.transform_point3(Vec3::X)], &[[5.0, 8.0, 0.0]]);
     let turn = Quat::from_array(QUARTER);
     assert!(scene.nodes[scene.instances[1].node as usize].rest.rotation.abs_diff_eq(turn, 1e-6));
+    // They are instances, not nodes.
+    let limited = |nodes, instances| {
+        let limits = Limits { nodes, instances, ..Limits::default() };
+        load_bytes("many.glb", &maker.glb(), None, &limits).map_err(|error| error.to_string())
+    };
+    assert!(limited(1, 3).is_ok());
+    assert!(limited(1, 2).unwrap_err().contains("3 instances, more than the limit of 2"));
+}
+
+/// Of a mesh that deforms the pose counts, too: weights are compared, and a skin's own place.
+#[test]
+fn only_the_same_pose_in_the_same_place_is_a_twin() {
+    let mut maker = morphed(|_, _| ());
+    let place = maker.json["nodes"][0].clone();
+    let weights = |w: f32| {
+        let mut node = place.clone();
+        node["weights"] = json!([w, 0]);
+        node
+    };
+    maker.json["nodes"] = json!([weights(0.25), weights(0.5), weights(0.25), weights(0.5)]);
+    maker.json.as_object_mut().unwrap().remove("animations");
+    let scene = maker.load();
+    assert_eq!((scene.instances.len(), scene.deformations.len()), (2, 2));
+    let instances: Vec<u32> = scene.deformations.iter().map(|d| d.instance).collect();
+    assert_eq!(instances, [0, 1]);
 }

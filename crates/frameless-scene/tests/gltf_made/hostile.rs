@@ -200,7 +200,7 @@ fn a_chain_of_100_000_nodes_costs_no_stack() {
     let error = load_bytes("deep.glb", &chain(1001).glb(), None, &limits).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "deep.glb: /nodes: 1001 levels of nodes, more than the limit of 1000"
+        "deep.glb: /nodes: 1001 levels of nodes, more than the limit of 1000; --max-nesting raises it"
     );
 }
 
@@ -216,20 +216,21 @@ fn a_chain_of_huge_scales_has_no_place_in_the_world() {
 #[test]
 fn every_limit_is_held() {
     type Lower = fn(&mut Limits);
-    let lower: [(&str, Lower); 11] = [
-        ("bytes of file", |limits| limits.file_bytes = 100),
-        ("decoded bytes", |limits| limits.decoded_bytes = 100),
-        ("triangles", |limits| limits.triangles = 1),
-        ("vertices", |limits| limits.vertices = 3),
-        ("nodes", |limits| limits.nodes = 2),
-        ("levels of nodes", |limits| limits.node_depth = 1),
-        ("instances", |limits| limits.instances = 0),
-        ("keyframes", |limits| limits.keyframes = 3),
-        ("levels of JSON nesting", |limits| limits.json_depth = 4),
-        ("JSON values", |limits| limits.json_values = 100),
-        ("pixels", |limits| limits.image_pixels = 3),
+    let lower: [(&str, &str, Lower); 12] = [
+        ("bytes of file", "--max-memory", |limits| limits.file_bytes = 100),
+        ("decoded bytes", "--max-memory", |limits| limits.decoded_bytes = 100),
+        ("triangles", "--max-triangles", |limits| limits.triangles = 1),
+        ("vertices", "--max-triangles", |limits| limits.vertices = 3),
+        ("nodes", "--max-nodes", |limits| limits.nodes = 2),
+        ("levels of nodes", "--max-nesting", |limits| limits.node_depth = 1),
+        ("instances", "--max-instances", |limits| limits.instances = 0),
+        ("keyframes", "--max-memory", |limits| limits.keyframes = 3),
+        ("levels of JSON nesting", "", |limits| limits.json_depth = 4),
+        ("JSON values", "--max-memory", |limits| limits.json_values = 100),
+        ("pixels in one image", "--max-texture-pixels", |limits| limits.image_pixels = 3),
+        ("pixels in all images", "--max-texture-pixels", |limits| limits.total_pixels = 3),
     ];
-    for (what, lower) in lower {
+    for (what, flag, lower) in lower {
         let mut limits = Limits::default();
         lower(&mut limits);
         let text = match load_bytes("rich.glb", &rich().glb(), None, &limits) {
@@ -238,6 +239,7 @@ fn every_limit_is_held() {
             Ok(scene) => scene.warnings.join("\n"),
         };
         assert!(text.contains(what) && text.contains("more than the limit"), "{what}: {text}");
+        assert!(text.contains(flag), "{what} is raised by {flag}: {text}");
     }
 }
 

@@ -235,6 +235,7 @@ fn an_image_of_few_bytes_cannot_fill_memory() {
         let scene = load(width, height);
         assert_eq!((scene.images[0].width, scene.images[0].height), (8, 8));
         assert!(warns(&scene, reason), "{reason}: {:?}", scene.warnings);
+        assert!(warns(&scene, "; --max-texture-pixels raises it"), "{:?}", scene.warnings);
     }
     assert_eq!(load(3000, 2000).images[0].width, 3000);
 }
