@@ -13,6 +13,10 @@ use glam::{Affine3A, Mat3A, Vec3, Vec3A, Vec4};
 
 use crate::{Deformation, Geometry, Mesh, Scene, State};
 
+/// A tenth of a light year: no vertex is drawn that is farther along an axis of its coordinates. Products of two coordinates, and of three in
+/// areas, must stay below 3.4e38.
+pub const FARTHEST_M: f32 = 1e15;
+
 /// The vertices of one deforming instance, and the pose that they belong to. Its memory is used again for the next pose.
 #[derive(Clone, Debug, Default)]
 pub struct Deformed {
@@ -34,6 +38,12 @@ impl Deformed {
     /// transforms overflow.
     pub fn positions(&self) -> &[Vec3A] {
         &self.positions
+    }
+
+    /// How many of them are nowhere: infinite, NaN or beyond [`FARTHEST_M`].
+    pub fn lost(&self) -> usize {
+        let is_somewhere = |p: &Vec3A| p.abs().cmplt(Vec3A::splat(FARTHEST_M)).all();
+        self.positions.iter().filter(|position| !is_somewhere(position)).count()
     }
 
     /// Of length one or zero; none if the mesh has none.

@@ -16,7 +16,7 @@ mod view;
 pub use animation::{AfterEnd, Animation, Channel, Interpolation, Target, Value, Values};
 pub use bounds::Bounds;
 pub use builtin::{BUILTIN_DESCRIPTIONS, BUILTIN_NAMES, builtin};
-pub use deform::Deformed;
+pub use deform::{Deformed, FARTHEST_M};
 pub use environment::{Environment, load_environment};
 pub use gltf::{
     AnimationChoice, Choice, Limits, LoadError, Pick, Place, Problem, load, load_bytes, load_chosen,

@@ -190,6 +190,25 @@ fn vertices_that_are_nowhere_take_only_their_triangles_away() {
     assert!(Flexible::new(&Mesh::default(), &[]).blas.bounds.is_none());
 }
 
+/// Once, not at every moment.
+#[test]
+fn vertices_that_get_lost_are_told_of() {
+    let mut scene = bending_ball();
+    let joint = scene.skins[0].joints[0];
+    scene.animation.channels.push(Channel {
+        target: Target::Scale(joint),
+        times: vec![0.0, BENDS_SECS],
+        values: Values::Vec3(vec![Vec3::ONE, Vec3::splat(1e30)]),
+        interpolation: Interpolation::Step,
+    });
+    let world = World::new(Arc::new(scene));
+    let is_said = &world.deforming[0].is_said;
+    let mut moment = world.moment(0.5);
+    assert!(!is_said.is_completed(), "all is there until the last key");
+    world.update_moment(f64::from(BENDS_SECS), &mut moment);
+    assert!(is_said.is_completed());
+}
+
 #[test]
 fn joints_that_overflow_hit_nothing() {
     for scale in [f32::INFINITY, f32::NAN, 1e38, 1e-38, 0.0] {

@@ -1,6 +1,6 @@
 //! From triangles to a wide BVH: of few at once, of many in parts (see [`crate::parts`]).
 
-use frameless_scene::Mesh;
+use frameless_scene::{FARTHEST_M, Mesh};
 use glam::{Affine3A, Vec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -80,12 +80,9 @@ pub(crate) fn corners_at(place: &Affine3A, mesh: &Mesh, primitive: u32) -> [Corn
     })
 }
 
-/// Products of two coordinates, and of three in the builder's areas, must stay below 3.4e38.
-pub(crate) const FARTHEST: f32 = 1e15;
-
 /// The box around a triangle; `None` if no tree may hold it.
 pub(crate) fn sane_box(corners: &[Corner; 3]) -> Option<[Vec3; 2]> {
-    let is_sane = |c: &Corner| c.at.is_finite() && c.at.abs().max_element() < FARTHEST;
+    let is_sane = |c: &Corner| c.at.is_finite() && c.at.abs().max_element() < FARTHEST_M;
     let [a, b, c] = corners.map(|corner| corner.at);
     corners.iter().all(is_sane).then(|| [a.min(b).min(c), a.max(b).max(c)])
 }

@@ -1,6 +1,6 @@
 //! Instances that deform: their vertices at one moment, and the BVH over them.
 
-use std::sync::Arc;
+use std::sync::{Arc, Once};
 
 use frameless::Deformed as Vertices;
 use frameless_scene::{Deformed, Geometry, Mesh, Scene, State};
@@ -15,18 +15,21 @@ pub(crate) struct Deforming {
     pub(crate) tree: Flexible,
     /// The mesh's, as the loop wants them.
     triangles: Arc<Vec<[u32; 3]>>,
+    /// Whether it has been said that vertices are lost: of whichever instance, at whichever moment.
+    pub(crate) is_said: Arc<Once>,
 }
 
 impl Deforming {
     /// All of the scene's, at time 0.
     pub(crate) fn all(scene: &Scene) -> Vec<Deforming> {
-        let state = scene.state_at(0.0);
+        let (state, is_said) = (scene.state_at(0.0), Arc::new(Once::new()));
         let all = (0..scene.deformations.len()).into_par_iter().map(|index| {
             let mut now = Deformed::default();
             scene.deform(index, &state, &mut now);
             let mesh = mesh(scene, index);
             let tree = Flexible::new(mesh, now.positions());
-            Deforming { now, tree, triangles: Arc::new(mesh.triangles.clone()) }
+            let triangles = Arc::new(mesh.triangles.clone());
+            Deforming { now, tree, triangles, is_said: is_said.clone() }
         });
         all.collect()
     }
@@ -36,8 +39,29 @@ impl Deforming {
         let changed = scene.deform(index, state, &mut self.now);
         if changed {
             self.tree.update(mesh(scene, index), self.now.positions());
+            self.say_what_is_lost(scene, index, state.secs);
         }
         changed
+    }
+
+    /// Once per world, however many of its instances and moments lose some. What is lost at time 0 the loader has told.
+    fn say_what_is_lost(&self, scene: &Scene, index: usize, secs: f64) {
+        if self.tree.is_whole || self.is_said.is_completed() {
+            return;
+        }
+        let (lost, all) = (self.now.lost(), self.now.positions().len());
+        if lost == 0 {
+            return;
+        }
+        self.is_said.call_once(|| {
+            let instance = scene.deformations[index].instance;
+            let node = &scene.nodes[scene.instances[instance as usize].node as usize].name;
+            log::warn!(
+                "{}: at {secs:.3} s morph targets or joints bring {lost} of {all} vertices of {node:?} infinitely far away: they are \
+                 not drawn (said once)",
+                scene.name
+            );
+        });
     }
 
     /// How many there are.

@@ -6,10 +6,10 @@
 //! C = Σ_slots A(slot) / A(root)
 //! ```
 
-use frameless_scene::Mesh;
+use frameless_scene::{FARTHEST_M, Mesh};
 use glam::Vec3A;
 
-use crate::build::{Blas, FARTHEST, Triangles};
+use crate::build::{Blas, Triangles};
 use crate::leaf::{Corner, Leaf, vertices_at};
 use crate::wide::{Bounds, Child, NOTHING, Node, half_area, union};
 
@@ -27,6 +27,8 @@ pub(crate) struct Flexible {
     boxes: Vec<Bounds>,
     /// C when the tree was built.
     cost_built: f32,
+    /// Whether every vertex is somewhere.
+    pub(crate) is_whole: bool,
 }
 
 /// A mesh with its vertices elsewhere. It holds every triangle, since those that are nowhere now may be somewhere later.
@@ -69,7 +71,7 @@ impl Flexible {
             }
         }
         let boxes = vec![NOTHING; blas.nodes.len()];
-        let mut flexible = Flexible { blas, vertices, boxes, cost_built: 0.0 };
+        let mut flexible = Flexible { blas, vertices, boxes, cost_built: 0.0, is_whole: true };
         flexible.cost_built = flexible.refit(positions);
         flexible
     }
@@ -84,7 +86,8 @@ impl Flexible {
 
     /// Moves triangles and boxes; returns C.
     pub(crate) fn refit(&mut self, positions: &[Vec3A]) -> f32 {
-        match are_all_sane(positions) {
+        self.is_whole = are_all_sane(positions);
+        match self.is_whole {
             true => self.fit_boxes(positions, |_| true),
             false => self.fit_boxes(positions, is_sane),
         }
@@ -119,11 +122,11 @@ impl Flexible {
 /// Whether no vertex is too far away, infinite or NaN: so is the sum, then. It may err on the safe side.
 fn are_all_sane(positions: &[Vec3A]) -> bool {
     let sum = positions.iter().fold(Vec3A::ZERO, |sum, position| sum + position.abs());
-    sum.cmplt(Vec3A::splat(FARTHEST)).all()
+    sum.cmplt(Vec3A::splat(FARTHEST_M)).all()
 }
 
 fn is_sane(position: &Vec3A) -> bool {
-    position.abs().cmplt(Vec3A::splat(FARTHEST)).all()
+    position.abs().cmplt(Vec3A::splat(FARTHEST_M)).all()
 }
 
 /// Moves a leaf's vertices; returns the box around those that are sane. The others become NaN, so that no ray meets their triangles.

@@ -6,7 +6,7 @@ use super::warnings::Warnings;
 use crate::{
     Bounds, Camera, Geometry, Light, LightKind, Material, Node, Projection, Scene, Transform,
 };
-use crate::{frame_bounds, look_at};
+use crate::{FARTHEST_M, frame_bounds, look_at};
 
 /// The angle between the top and the bottom of the added camera's picture: 40°, between a normal and a wide lens.
 const YFOV_RAD: f32 = 0.7;
@@ -21,8 +21,7 @@ pub(super) fn add_camera(scene: &mut Scene, warnings: &mut Warnings) {
     const SMALLEST_RADIUS: f32 = 1e-9;
     /// The same of the distance from the origin, four steps of single precision: what is smaller would frame rounding errors.
     const SMALLEST_SHARE: f32 = 2.5e-7;
-    /// A hundred light years in kilometres: squares of what is farther away are infinite.
-    const FARTHEST: Vec3 = Vec3::splat(1e15);
+    const FARTHEST: Vec3 = Vec3::splat(FARTHEST_M);
     /// What is farther away may be lost.
     const DRAWN: f32 = 1.001e12;
     if !scene.cameras.is_empty() {

@@ -20,6 +20,7 @@ use super::instances::place_instances;
 use super::json::{Json, parse};
 use super::light::load_lights;
 use super::limits::{Budget, Limits, within};
+use super::lost::warn_of_lost_vertices;
 use super::material::load_materials;
 use super::mesh::load_meshes;
 use super::node::{Hierarchy, load_nodes, node_called};
@@ -144,6 +145,7 @@ fn build(document: &mut Document<'_>, choice: &Choice) -> Result<Scene, Fault> {
     let state = scene.state_at(0.0);
     refuse_infinite_places(&state, &hierarchy)?;
     leave_out_twins(&mut scene, &state, &mut document.warnings);
+    warn_of_lost_vertices(&scene, &state, &hierarchy, &mut document.warnings);
     Ok(scene)
 }
 

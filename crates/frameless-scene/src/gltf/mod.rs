@@ -36,6 +36,7 @@ mod layers;
 mod light;
 mod limits;
 mod load;
+mod lost;
 mod material;
 mod mesh;
 mod node;

@@ -424,3 +424,22 @@ fn only_the_same_pose_in_the_same_place_is_a_twin() {
     let instances: Vec<u32> = scene.deformations.iter().map(|d| d.instance).collect();
     assert_eq!(instances, [0, 1]);
 }
+
+#[test]
+fn what_morphs_or_bends_to_infinity_is_told_of() {
+    let said = |maker: &Maker| {
+        let warnings = maker.load().warnings;
+        warnings.into_iter().find(|warning| warning.contains("infinitely far away"))
+    };
+    let mut maker = morphed(|_, _| ());
+    maker.json["nodes"][0]["weights"] = json!([1e37, 0.0]);
+    assert_eq!(said(&maker).as_deref(), Some(LOST_ALL));
+    maker.json["nodes"][0]["weights"] = json!([1e3, 0.0]);
+    assert_eq!(said(&maker), None);
+    // The shoulder carries the arm's begin, the elbow its end, and both its middle.
+    let mut maker = bent_arm();
+    maker.json["nodes"][2]["scale"] = json!([1e37, 1e37, 1e37]);
+    assert!(said(&maker).is_some_and(|text| text.ends_with("/nodes/0 (2 of 3)")));
+}
+
+const LOST_ALL: &str = "vertices that morph targets or joints bring infinitely far away are not drawn: /nodes/0 (4 of 4)";
