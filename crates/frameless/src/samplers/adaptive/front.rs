@@ -1,7 +1,13 @@
 //! Front propagation: where a sample found a change, its neighbours have probably changed too.
 //!
-//! Tiles that have such neighbours wait, first come first served, and hold a bit for each: for those that had not been traced for a
-//! while when the change was found, and have not been since.
+//! ```text
+//! part of a front:       d / 3 > 0.05²           of a sample at time t that was no late look
+//! beside it, a pixel waits if it was traced before t − f, until it is traced
+//! f ← f / (1 + 29 Δt)    after a batch that left nobody waiting, else f ← f (1 + 29 Δt);   1 ms ≤ f ≤ 12 ms
+//! ```
+//!
+//! So that what is about to change again is looked at again as soon as there are samples for it, and no sooner. Tiles that have such neighbours
+//! wait, first come first served, and hold a bit for each.
 
 use std::collections::VecDeque;
 

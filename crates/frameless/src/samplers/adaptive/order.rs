@@ -1,4 +1,9 @@
-//! Which pixel of a tile is next: Bayer's order, but those that are young for their tile are passed over.
+//! Which pixel of a tile is next: Bayer's order (1973), but those that are young for their tile are passed over.
+//!
+//! ```text
+//! next = the first of four in the order with age > ā / 2, else the oldest of the four
+//! ā ← ā + 0.05 (age − ā)                         for every sample of the tile that replaces one of that age
+//! ```
 
 use crate::traced::{HALF_TICKS_PER_SEC, Mark, TILE_PIXELS, TileMarks};
 use crate::{Rng, bayer};
