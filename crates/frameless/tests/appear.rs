@@ -79,8 +79,8 @@ fn after_a_large_change_the_picture_is_right_everywhere_soon_and_never_coarser_a
 #[test]
 fn whatever_changes_no_pixel_grows_older_than_its_share_of_the_even_part_allows() {
     let disc = |secs: f64| [48.0 + 30.0 * (5.0 * secs).sin() as f32, 36.0, 10.0];
-    let flicker = |secs: f64, _: [f32; 2]| if (60.0 * secs) as u64 % 2 == 0 { 1.0 } else { 0.4 };
-    let blinking = |secs: f64| [48.0, 36.0, if (8.0 * secs) as u64 % 2 == 0 { 20.0 } else { -1.0 }];
+    let flicker = |secs: f64, _: [f32; 2]| if (30.0 * secs).fract() < 0.5 { 1.0 } else { 0.4 };
+    let blinking = |secs: f64| [48.0, 36.0, if (4.0 * secs).fract() < 0.5 { 20.0 } else { -1.0 }];
     let swaying: Camera = |secs| rotating((2.0 * secs).sin());
     let worlds = [
         ("rotating", world(swaying, disc)),
