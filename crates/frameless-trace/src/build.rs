@@ -146,9 +146,10 @@ pub(crate) fn build(
         };
         tree
     };
-    let tree = make(&binary_tree(&boxes, REINSERTED));
+    let binary = binary_tree(boxes, REINSERTED);
+    let tree = make(&binary);
     let is_deep = tree.roots.iter().any(|root| root.stack_need > most_stack);
-    if is_deep { make(&halve(&boxes)) } else { tree }
+    if is_deep { make(&halve(&boxes_of(&binary))) } else { tree }
 }
 
 /// Whether some triangles have few enough vertices for one leaf.
@@ -160,11 +161,22 @@ fn fits(corners: impl Fn(u32) -> [Corner; 3], triangles: &[u32]) -> bool {
     leaf::vertices(&names[..triangles.len()]) <= MOST_VERTICES
 }
 
-/// Divided from above; then the largest of the boxes, as many of a hundred, find better places. A box per leaf.
-pub(crate) fn binary_tree(boxes: &[Aabb], reinserted: f32) -> Bvh2 {
-    let mut binary = sah::divide(boxes);
+/// Divided from above; then the largest of the boxes, as many of a hundred, find better places. A box per leaf, which is the only one left of
+/// it: see [`boxes_of`].
+pub(crate) fn binary_tree(boxes: Vec<Aabb>, reinserted: f32) -> Bvh2 {
+    let mut binary = sah::divide(&boxes);
+    drop(boxes);
     ReinsertionOptimizer::default().run(&mut binary, reinserted, None);
     binary
+}
+
+/// What a tree with a box per leaf was made of.
+pub(crate) fn boxes_of(binary: &Bvh2) -> Vec<Aabb> {
+    let mut boxes = vec![Aabb::INVALID; binary.primitive_indices.len()];
+    for leaf in binary.nodes.iter().filter(|node| node.is_leaf()) {
+        boxes[binary.primitive_indices[leaf.first_index as usize] as usize] = *leaf.aabb();
+    }
+    boxes
 }
 
 fn one_leaf(boxes: &[Aabb]) -> Bvh2 {
@@ -233,8 +245,11 @@ mod tests {
     #[test]
     fn halving_never_needs_more_stack_than_there_is() {
         let boxes = shrinking(390);
-        let deep = stack_need(&binary_tree(&boxes, REINSERTED));
+        let binary = binary_tree(boxes.clone(), REINSERTED);
+        let deep = stack_need(&binary);
         assert!(deep > STACK_PER_TREE, "{deep}: the fallback would never be taken");
+        let kept = boxes_of(&binary);
+        assert!(kept.iter().map(|b| (b.min, b.max)).eq(boxes.iter().map(|b| (b.min, b.max))));
         let halved = stack_need(&halve(&boxes));
         assert!(halved <= 7 * 9, "{halved} for 390 boxes");
     }

@@ -46,6 +46,7 @@ mod shares;
 mod sheen;
 mod sheets;
 mod sift;
+mod sparing;
 mod sphere;
 mod standing;
 mod surroundings;

@@ -13,7 +13,7 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
 
-use crate::build::{self, Root, Tree, Triangles, binary_tree, halve, sane_box};
+use crate::build::{self, Root, Tree, Triangles, binary_tree, boxes_of, halve, sane_box};
 use crate::collapse::{Collapse, bounds};
 use crate::leaf::LONGEST;
 use crate::sah::split;
@@ -54,7 +54,7 @@ pub(crate) fn build(triangles: &impl Triangles) -> Tree {
     // They are made again part by part: there is no room for all of them beside the tree.
     drop(boxes);
     let mut all = Tree::with_room_for(order.len());
-    for some in parts.chunks(4 * rayon::current_num_threads()) {
+    for some in parts.chunks(2 * rayon::current_num_threads()) {
         let build = |part: &Range<usize>| {
             let roots = (part.len() / PER_ROOT).max(2);
             build::build(triangles, &order[part.clone()], roots, STACK_PER_PART)
@@ -62,6 +62,7 @@ pub(crate) fn build(triangles: &impl Triangles) -> Tree {
         let built: Vec<Tree> = some.par_iter().map(build).collect();
         built.into_iter().for_each(|part| all.append(part));
     }
+    drop((parts, order));
     all.join();
     all
 }
@@ -96,25 +97,33 @@ impl Tree {
 
     /// Builds the tree over the trees, in front of them.
     fn join(&mut self) {
-        let boxes = self.roots.iter().map(|root| Aabb::new(root.bounds[0], root.bounds[1]));
-        let boxes: Vec<Aabb> = boxes.collect();
-        let most_below = self.roots.iter().map(|root| root.stack_need).max().unwrap_or(0);
+        // Memory is never as scarce as here: what is not wanted any more goes at once.
+        let roots = std::mem::take(&mut self.roots);
+        let most_below = roots.iter().map(|root| root.stack_need).max().unwrap_or(0);
+        let children: Vec<Child> = roots.iter().map(|root| root.child).collect();
+        let boxes: Vec<Aabb> =
+            roots.iter().map(|root| Aabb::new(root.bounds[0], root.bounds[1])).collect();
+        drop(roots);
+        let mut binary = binary_tree(boxes, REINSERTED);
         let mut collapse = Collapse::default();
-        let mut make = |binary: &Bvh2, moved_by: usize| {
+        collapse.plan(&binary, 1.0, |_| false);
+        let make = |collapse: &mut Collapse, binary: &Bvh2, moved_by: usize| {
             let mut nodes = Vec::new();
-            collapse.plan(binary, 1.0, |_| false);
             let stack_need = collapse.make_root(binary, &mut nodes, |root| {
-                self.roots[root[0] as usize].child.moved(moved_by, 0)
+                children[root[0] as usize].moved(moved_by, 0)
             });
             (nodes, stack_need + most_below)
         };
-        let mut binary = binary_tree(&boxes, REINSERTED);
-        if make(&binary, 0).1 > STACK_PER_TREE {
-            binary = halve(&boxes);
-        }
         // How many nodes there are is known only once there are all.
-        let front = make(&binary, 0).0.len();
-        let (nodes, stack_need) = make(&binary, front);
+        let (mut front, mut stack_need) = make(&mut collapse, &binary, 0);
+        if stack_need > STACK_PER_TREE {
+            binary = halve(&boxes_of(&binary));
+            collapse.plan(&binary, 1.0, |_| false);
+            (front, stack_need) = make(&mut collapse, &binary, 0);
+        }
+        let front = front.len();
+        let (nodes, _) = make(&mut collapse, &binary, front);
+        drop(collapse);
         self.nodes.iter_mut().for_each(|node| *node = node.moved(front, 0));
         self.nodes.extend(nodes);
         self.nodes.rotate_right(front);

@@ -15,6 +15,7 @@ use crate::holes::may_have_holes;
 use crate::images::Mirrors;
 use crate::kernel::Isa;
 use crate::matter::is_plain;
+use crate::sparing::Sparing;
 use crate::standing::Standing;
 use crate::surroundings::Surroundings;
 use crate::texture::Copies;
@@ -55,6 +56,7 @@ impl World {
 
     pub(crate) fn with_isa(scene: Arc<Scene>, isa: Isa) -> World {
         static WORLDS: AtomicU64 = AtomicU64::new(1);
+        let _sparing = Sparing::begin();
         let is_rigid = rigid_geometries(&scene);
         let (standing, copies) = rayon::join(|| Standing::new(&scene), || Copies::new(&scene));
         let mut stands = vec![false; scene.geometries.len()];
