@@ -181,11 +181,17 @@ impl<'a> Accessor<'a> {
         budget: &mut Budget,
         read: impl Fn(&[u8]) -> T,
     ) -> Result<Vec<T>, Fault> {
-        budget.allocate(&self.pointer, self.count, size_of::<T>())?;
+        let (count, each) = (self.count, size_of::<T>());
         let mut elements = match self.dense {
-            Some(dense) => (0..self.count).map(|i| read(dense.element(i))).collect(),
-            // Every type of element is at most 16 components of 4 bytes.
-            None => vec![read(&[0; 64]); self.count],
+            Some(dense) => {
+                budget.allocate(&self.pointer, count, each)?;
+                (0..count).map(|i| read(dense.element(i))).collect()
+            }
+            None => {
+                budget.allocate_zeros(&self.pointer, count, each)?;
+                // Every type of element is at most 16 components of 4 bytes.
+                vec![read(&[0; 64]); count]
+            }
         };
         if let Some(sparse) = &self.sparse {
             sparse.replace(&mut elements, read)?;

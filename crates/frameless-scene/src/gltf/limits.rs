@@ -57,6 +57,7 @@ impl Default for Limits {
 pub(super) struct Budget {
     pub(super) limits: Limits,
     bytes: u64,
+    void_bytes: u64,
     triangles: u64,
     vertices: u64,
     pixels: u64,
@@ -66,9 +67,16 @@ pub(super) struct Budget {
 
 impl Budget {
     pub(super) fn new(limits: &Limits) -> Budget {
-        let limits = limits.clone();
-        let (bytes, triangles, vertices, keyframes) = (0, 0, 0, 0);
-        Budget { limits, bytes, triangles, vertices, pixels: 0, thin_pixels: 0, keyframes }
+        Budget {
+            limits: limits.clone(),
+            bytes: 0,
+            void_bytes: 0,
+            triangles: 0,
+            vertices: 0,
+            pixels: 0,
+            thin_pixels: 0,
+            keyframes: 0,
+        }
     }
 
     /// `count` things of `each` bytes are about to be allocated for what stands at `pointer`.
@@ -80,6 +88,21 @@ impl Budget {
     ) -> Result<(), Fault> {
         let bytes = (count as u64).saturating_mul(each as u64);
         spend(&mut self.bytes, bytes, self.limits.decoded_bytes, "decoded bytes", pointer)
+    }
+
+    /// The same of an accessor without data, whose elements are zeros until a sparse one replaces some: morph targets that move little.
+    pub(super) fn allocate_zeros(
+        &mut self,
+        pointer: &str,
+        count: usize,
+        each: usize,
+    ) -> Result<(), Fault> {
+        /// Of all bytes: by default 32 MiB, in two seconds. A file of 600 bytes could take a minute and 5 GB otherwise.
+        const VOID_SHARE: u64 = 128;
+        let bytes = (count as u64).saturating_mul(each as u64);
+        let limit = self.limits.decoded_bytes / VOID_SHARE;
+        spend(&mut self.void_bytes, bytes, limit, "bytes of zeros without data", pointer)?;
+        self.allocate(pointer, count, each)
     }
 
     pub(super) fn add_triangles(&mut self, pointer: &str, count: usize) -> Result<(), Fault> {
@@ -143,7 +166,11 @@ pub(crate) fn check_environment_size(
 /// The flag of the program `frameless` that raises the limit of what an error speaks of, if there is one.
 pub(super) fn flag_of(what: &str) -> Option<&'static str> {
     Some(match what {
-        "decoded bytes" | "bytes of file" | "keyframes" | "JSON values" => "--max-memory",
+        "decoded bytes"
+        | "bytes of zeros without data"
+        | "bytes of file"
+        | "keyframes"
+        | "JSON values" => "--max-memory",
         "triangles" | "vertices" => "--max-triangles",
         "pixels in one image" | "pixels in all images" | "pixels in images of few bytes" => {
             "--max-texture-pixels"

@@ -145,6 +145,24 @@ fn counts_without_data_are_held_against_the_limits() {
     assert!(matches!(error.problem, Problem::Limit { .. }), "{error}");
 }
 
+/// They are decoded, built into trees and drawn like any others, so that together they may be fewer than what the file has bytes for.
+#[test]
+fn zeros_without_data_are_limited_together() {
+    let load = |count: u64, targets: usize| {
+        let maker = Maker::with_primitive(|maker| {
+            let accessor = json!({"componentType": F32, "type": "VEC3", "count": count});
+            let position = maker.push("accessors", accessor);
+            json!({"attributes": {"POSITION": position}, "targets": vec![json!({"POSITION": position}); targets]})
+        });
+        maker.try_load().map_err(|error| error.to_string())
+    };
+    let refused =
+        "bytes of zeros without data, more than the limit of 33554432; --max-memory raises it";
+    assert!(load(3_000_000, 0).unwrap_err().contains(refused));
+    assert!(load(30_000, 200).unwrap_err().contains(refused));
+    assert!(load(30_000, 80).is_ok());
+}
+
 #[test]
 fn offsets_that_wrap_around_are_refused() {
     for (list, key) in [("accessors", "byteOffset"), ("bufferViews", "byteOffset")] {
