@@ -41,6 +41,44 @@ fn no_sample_of_one_object_is_gathered_for_another() {
     }
 }
 
+/// A disc that stays in the picture while the plane behind it, of one colour, passes by: the mean error, and how many pixels show it beside it.
+fn before_a_plain_plane(kind: ReconstructionKind, rate: f64) -> (f32, usize) {
+    let passing: Camera = |secs| [[1.0, 0.0, 300.0 * secs as f32], [0.0, 1.0, 0.0]];
+    let disc = |secs: f64| {
+        let secs = secs as f32;
+        [48.0 + 3.0 * (4.0 * secs).sin() - 300.0 * secs, 36.0, 14.0]
+    };
+    // This light takes the plane's texture away.
+    let world = World {
+        light: |_, [x, y]| 0.4 / (0.3 + 0.2 * (0.35 * x).sin() * (0.3 * y).cos()),
+        ..world(passing, disc)
+    };
+    let mut engine = engine(world, kind, rate);
+    play(&mut engine, 20);
+    let (mut error, mut wider) = (0.0, 0);
+    for _ in 0..40 {
+        let (picture, secs) = play(&mut engine, 1);
+        let ideal = world.ideal(secs);
+        error += rmse(&picture, &ideal) / 40.0;
+        let is_disc = |rgb: &[f32; 3]| rgb[0] > 0.1;
+        let pairs = picture.iter().zip(&ideal);
+        wider += pairs.filter(|(shown, ideal)| is_disc(shown) && !is_disc(ideal)).count();
+    }
+    (error, wider)
+}
+
+#[test]
+fn a_small_thing_before_an_empty_background_is_not_made_wider() {
+    for rate in [120_000.0, 240_000.0, 480_000.0] {
+        let (hold, _) = before_a_plain_plane(ReconstructionKind::Hold, rate);
+        let (reproject, wider) = before_a_plain_plane(ReconstructionKind::REPROJECT, rate);
+        // Of 88 pixels around the disc, and 40 pictures.
+        assert!(wider < 88 * 40 / 10, "{rate}: {wider}");
+        // A pixel at its edge is held for no longer than a refresh here, and no texture shows that the plane has been held.
+        assert!(reproject < 1.75 * hold, "{rate}: {reproject} {hold}");
+    }
+}
+
 #[test]
 fn a_picture_at_rest_is_the_held_one_bit_for_bit_also_after_motion() {
     let stopping: Camera = |secs| rotating(secs.min(0.4));

@@ -6,8 +6,16 @@
 //! ```
 //!
 //! The reference is the pixel's own sample with the least expected error. Pixels without one are holes: beside samples they show
-//! the mean of those around that belong to the nearest one's object, farther away something smooth between what is known
+//! the mean of those around that belong to one object, farther away something smooth between what is known
 //! ([`smooth`](super::smooth)), as old as the nearest pixel that is no hole ([`fill`](super::fill)).
+//!
+//! ```text
+//! a a ·      Which object: one that has samples at opposite sides of the hole, of several the nearest to the camera: it is a gap in that.
+//! a ? a      Else that of the farthest sample: what has been uncovered is what was behind.
+//! · b b
+//! ```
+//!
+//! In a hole of the second kind the last ray tells what is there, if it went since the last refresh and by more than 7 % behind all around.
 //!
 //! A tile in which nothing has been touched goes on showing what it shows, as long as all its samples would still be taken as they are.
 
@@ -54,6 +62,8 @@ pub(super) struct Look<'a, F> {
     /// Samples beside their pixel's centre are to be traced again, where their object rests; so are those at the centre that have been
     /// carried there, since the camera came to rest only after this time.
     pub(super) carried: Tick,
+    /// When the picture before was shown.
+    pub(super) before: Tick,
     /// Of an object number; `None`: no sample is to be traced again.
     pub(super) rests: Option<F>,
 }
@@ -104,6 +114,9 @@ impl Line {
         &self.pixels[..std::mem::take(&mut self.len)]
     }
 }
+
+/// What lies farther than all around a hole by more than this ratio is behind them.
+const BEHIND: f32 = 0.07;
 
 /// Below this expected error a sample is taken as it is.
 const EXACT: f32 = 2e-5;
@@ -172,9 +185,11 @@ impl Gather {
 
 /// Rows of cells, as columns of numbers: of those of one row of pixels, and of the rows above and below it.
 ///
-/// Column and row from the pixel's centre, the bits of the object's number, the bits of the tick, red, green, blue.
+/// Column and row from the pixel's centre, the bits of the object's number, the bits of the tick, red, green, blue, depth.
 #[derive(Default)]
-struct Rows([Vec<f32>; 7]);
+struct Rows([Vec<f32>; PLANES]);
+
+const PLANES: usize = 8;
 
 /// So many rows of pixels are there at a time, turn by turn.
 const ROWS: usize = 3;
@@ -198,10 +213,11 @@ impl Rows {
             let (records, _) = store.record[from..from + stride].as_chunks::<8>();
             let eights = objects.iter().zip(records).zip(wanted).zip((to..).step_by(8));
             for (((objects, records), _), at) in eights.filter(|((_, wanted), _)| **wanted) {
-                let [_, place, tick, r, g, b] = F8::<U>::six_columns(store::rows_of(records));
+                let [depth, place, tick, r, g, b] = F8::<U>::six_columns(store::rows_of(records));
                 let [x, y] = store::offsets(place);
                 let object = M8::load(objects, 0).as_f32();
-                for (column, plane) in [x, y, object, tick, r, g, b].iter().zip(&mut self.0) {
+                let columns = [x, y, object, tick, r, g, b, store::depths(depth)];
+                for (column, plane) in columns.iter().zip(&mut self.0) {
                     column.store(plane, at);
                 }
             }
@@ -311,7 +327,7 @@ impl<U: Unit> Model<U> {
 #[derive(Clone, Copy)]
 struct Near<'a> {
     /// As in [`Rows`].
-    samples: Planes<'a, f32, 7>,
+    samples: Planes<'a, f32, PLANES>,
     cells: &'a Cells,
 }
 
@@ -352,8 +368,10 @@ struct Eight<U: Unit> {
 
 /// What is around eight pixels that have no samples.
 struct AroundHoles<U: Unit> {
-    /// The object of the sample nearest to the centre; [`EMPTY`] where there is none.
+    /// The object that is probably there; [`EMPTY`] where there is none around.
     object: M8<U>,
+    /// Where the last ray tells more.
+    by_ray: M8<U>,
     /// Whether any pixel beside it has samples.
     any: M8<U>,
     /// When the newest sample of the first of them in the order of [`AROUND`] was traced.
@@ -479,16 +497,18 @@ impl<F: Fn(u32) -> bool> Blocks<'_, F> {
         let inside = M8::first_lanes(lanes);
         let holes = seen.object.equals(empty).and(inside);
         let object = seen.object;
-        let mut far = M8::splat(0);
+        let [mut far, mut by_ray] = [M8::splat(0); 2];
         if holes.any() {
-            let around = near.around_holes(eight);
+            let around = near.around_holes(eight, self.look.before);
             seen.object = around.object.or(holes, seen.object);
             seen.tick = around.tick.or(holes, seen.tick);
             far = around.any.not().and(holes);
+            by_ray = around.by_ray.and(holes);
+            seen.rgb = F8::all_or(near.last(eight), by_ray, seen.rgb);
             self.note_holes(eight, holes);
         }
         let good = seen.error.less_than(F8::splat(EXACT));
-        let exact = if self.means { good } else { holes.not() };
+        let exact = if self.means { good } else { holes.not() }.either(by_ray);
         if !exact.either(seen.object.equals(empty)).all() {
             let mean = near.mean(eight, seen.object, holes);
             seen.rgb = F8::all_or(seen.rgb, exact, mean);
@@ -553,8 +573,8 @@ impl<F: Fn(u32) -> bool> Blocks<'_, F> {
 impl<U: Unit> Seen<U> {
     /// Samples as in [`Rows`].
     #[inline(always)]
-    fn new(samples: [F8<U>; 7], eight: &Eight<U>, carried: Tick) -> Self {
-        let [x, y, object, tick, rgb @ ..] = samples;
+    fn new(samples: [F8<U>; PLANES], eight: &Eight<U>, carried: Tick) -> Self {
+        let [x, y, object, tick, r, g, b, _] = samples;
         let (object, tick) = (object.to_bits(), tick.to_bits());
         let (none, empty) = (M8::splat(0), M8::splat(EMPTY));
         let distance2 = x * x + y * y;
@@ -563,7 +583,7 @@ impl<U: Unit> Seen<U> {
         let is_later = none.less_than(tick.minus(M8::splat(carried.0)));
         let error = eight.model.error(distance2, tick);
         Seen {
-            rgb: F8::all_or(rgb, is_sample, [F8::splat(0.0); 3]),
+            rgb: F8::all_or([r, g, b], is_sample, [F8::splat(0.0); 3]),
             object,
             error: error.or(is_sample, F8::splat(f32::MAX)),
             tick: tick.and(is_sample),
@@ -610,35 +630,61 @@ impl Near<'_> {
         seen
     }
 
-    /// What is around the pixels, those that have no samples.
+    /// What is around the pixels, those that have no samples. `before`: the last refresh.
     #[inline(always)]
-    fn around_holes<U: Unit>(&self, eight: &Eight<U>) -> AroundHoles<U> {
+    fn around_holes<U: Unit>(&self, eight: &Eight<U>, before: Tick) -> AroundHoles<U> {
         if self.cells.own.len() > 1 {
             return AroundHoles { object: self.nearest(eight), ..self.beside(eight) };
         }
         let (none, empty) = (M8::splat(0), M8::splat(EMPTY));
-        let mut found = AroundHoles { object: empty, any: none, tick: none };
-        let (mut least, mut first) = (F8::splat(f32::INFINITY), M8::splat(AROUND.len() as u32));
+        let (mut tick, mut first) = (none, M8::splat(AROUND.len() as u32));
+        let (mut least, mut most) = (F8::splat(f32::INFINITY), F8::splat(-1.0));
+        let (mut farthest, mut enclosing, mut depth_of_that) = (empty, empty, least);
         let around = self.samples.around(eight.first, &self.cells.around);
         for (k, beside) in self.cells.beside.iter().enumerate() {
             // Nothing is in the pixels themselves.
             if beside.nth == AROUND.len() as u32 {
                 continue;
             }
-            let [x, y, object, tick, ..] = around.load(k);
+            let [_, _, object, when, .., depth] = around.load(k);
             let object = object.to_bits();
             let is_sample = object.equals(empty).not();
-            let distance2 = beside.distance2(x, y);
-            let nearer = distance2.less_than(least).and(is_sample);
-            least = distance2.or(nearer, least);
-            found.object = object.or(nearer, found.object);
+            let is_farther = most.less_than(depth).and(is_sample);
+            most = depth.or(is_farther, most);
+            farthest = object.or(is_farther, farthest);
+            let is_nearer = depth.less_than(least).and(is_sample);
+            least = depth.or(is_nearer, least);
+            let opposite = self.cells.beside.len() - 1 - k;
+            if k < opposite {
+                let [_, _, other, ..] = around.load(opposite);
+                let on_both_sides = other.to_bits().equals(object).and(is_sample);
+                let is_nearer = depth.less_than(depth_of_that).either(enclosing.equals(empty));
+                depth_of_that = depth.or(on_both_sides.and(is_nearer), depth_of_that);
+                enclosing = object.or(on_both_sides.and(is_nearer), enclosing);
+            }
             let nth = M8::splat(beside.nth);
             let is_first = nth.less_than(first).and(is_sample);
             first = nth.or(is_first, first);
-            found.tick = tick.to_bits().or(is_first, found.tick);
+            tick = when.to_bits().or(is_first, tick);
         }
-        found.any = first.less_than(M8::splat(AROUND.len() as u32));
-        found
+        let is_open = enclosing.equals(empty);
+        let own = self.samples.around(eight.first, &self.cells.own);
+        let [_, _, _, last, .., depth] = own.load(0);
+        let is_new = none.less_than(last.to_bits().minus(M8::splat(before.0)));
+        let is_behind = least.less_than(depth * F8::splat(1.0 - BEHIND));
+        AroundHoles {
+            object: farthest.or(is_open, enclosing),
+            by_ray: is_open.and(is_new).and(is_behind),
+            any: first.less_than(M8::splat(AROUND.len() as u32)),
+            tick,
+        }
+    }
+
+    /// The colours of the samples that were in the pixels last.
+    #[inline(always)]
+    fn last<U: Unit>(&self, eight: &Eight<U>) -> [F8<U>; 3] {
+        let [.., r, g, b, _] = self.samples.around(eight.first, &self.cells.own).load(0);
+        [r, g, b]
     }
 
     /// The objects of the samples nearest to the centres of holes; [`EMPTY`] where there is none around.
@@ -666,7 +712,7 @@ impl Near<'_> {
         let (mut red, mut green, mut blue, mut weights) = (zero, zero, zero, zero);
         let around = self.samples.around(eight.first, &self.cells.around);
         for (k, beside) in self.cells.beside.iter().enumerate() {
-            let [x, y, other, tick, r, g, b] = around.load(k);
+            let [x, y, other, tick, r, g, b, _] = around.load(k);
             let (other, tick) = (other.to_bits(), tick.to_bits());
             let counts = other.equals(object).and(holes.either(M8::splat(beside.is_near)));
             let distance2 = beside.distance2(x, y);
@@ -684,7 +730,7 @@ impl Near<'_> {
     #[inline(always)]
     fn beside<U: Unit>(&self, eight: &Eight<U>) -> AroundHoles<U> {
         let (none, object) = (M8::splat(0), M8::splat(EMPTY));
-        let mut beside = AroundHoles { object, any: none, tick: none };
+        let mut beside = AroundHoles { object, by_ray: none, any: none, tick: none };
         let cells = self.samples.around(eight.first, &self.cells.pixels);
         let subs = cells.len() / AROUND.len();
         for nth in 0..AROUND.len() {
@@ -699,7 +745,7 @@ impl Near<'_> {
 
 /// Whether there are samples in some cells of eight pixels, and when the newest were traced.
 #[inline(always)]
-fn newest<U: Unit>(cells: &Around<'_, f32, 7>, some: Range<usize>) -> (M8<U>, M8<U>) {
+fn newest<U: Unit>(cells: &Around<'_, f32, PLANES>, some: Range<usize>) -> (M8<U>, M8<U>) {
     let none = M8::splat(0);
     let (mut is_known, mut newest) = (none, none);
     for k in some {

@@ -61,6 +61,8 @@ pub struct Reproject {
     poses: [Pose; 2],
     /// Seconds between these two.
     interval_secs: f32,
+    /// When the earlier was.
+    before: Tick,
     /// When everything was carried somewhere else last, since the camera moved.
     carried: Tick,
     refreshes: u64,
@@ -95,6 +97,7 @@ impl Reproject {
             display: Display::default(),
             poses: Default::default(),
             interval_secs: 0.0,
+            before: Tick::default(),
             carried: Tick::default(),
             refreshes: 0,
             knows_lights: false,
@@ -150,7 +153,7 @@ impl Reproject {
             self.covers.note(&self.store, cell, sample);
             let object = self.store.object[cell];
             if !self.settled.rests(object) {
-                self.warp.displace(&mut self.store, cell, sample.px);
+                self.warp.displace(&mut self.store, cell, sample);
             } else if object == sample.object {
                 self.shadows.note(&self.store, cell, sample);
             }
@@ -250,6 +253,7 @@ impl Reproject {
             Some(pose) => self.poses[0].clone_from(pose),
             None => self.poses[0] = Pose::default(),
         }
+        self.before = Tick::of(self.shown_at);
         self.interval_secs = refresh.now.secs_since(self.shown_at) as f32;
         self.refreshes += 1;
         self.shown_at = refresh.now;
@@ -271,7 +275,12 @@ impl Reproject {
             // Of what was kept before the first refresh nobody knows yet where it is.
             let (first, settled) = (self.refreshes < 2, &self.settled);
             let rests = |object| object == store::SCREEN || !first && settled.rests(object);
-            self.warp.run(&mut self.store, &self.poses[0], refresh.threads, rests);
+            let motion = warp::Motion {
+                poses: self.poses.each_ref(),
+                ticks: [Tick::of(refresh.now), self.before],
+                is_known: !first,
+            };
+            self.warp.run(&mut self.store, &motion, refresh.threads, rests);
             if self.options.without != Some(ReprojectStage::Cracks) {
                 cracks::remove(&mut self.store, refresh.threads, &mut self.covered);
             }
@@ -325,6 +334,7 @@ impl Reproject {
             rates,
             contrast: &self.contrast,
             carried: self.carried,
+            before: self.before,
             rests: (recentres && self.settled.any_rests()).then_some(&rests),
         };
         let shown = gather::Shown { rgb: &mut self.shown, marks: &mut marks };

@@ -2,9 +2,11 @@
 //!
 //! The new hit is projected to where it was at the last refresh. For a surface at rest the error is the smaller of those against the
 //! nearest pixel and against the bilinear interpolation. For a moving one it is the distance to the range of the 3×3 colours
-//! there, plus a tenth of that: resampling a texture at other places is not change.
+//! there, plus a tenth of that: resampling a texture at other places is not change. What comes into the picture is compared with the border
+//! where it does: that is what would be shown without a sample. And if its pixel has been traced since the last refresh and the same object
+//! was hit, only what differs from that is change: what the last picture did not know has been found already.
 
-use super::store::{SCREEN, Sample};
+use super::store::{SCREEN, Sample, Tick};
 use super::{Reproject, ReprojectStage};
 use crate::{Display, Kept, Request, Size};
 
@@ -90,12 +92,11 @@ impl Reproject {
         let surface = sample.surface();
         let then = self.poses[0].project(&surface);
         let depth = then.map_or(f32::INFINITY, |there| there.depth);
-        let inside = |px: &[f32; 2]| {
-            px[0] >= 0.0 && px[1] >= 0.0 && px[0] < size.width as f32 && px[1] < size.height as f32
-        };
-        let Some(px) = then.map(|there| there.px).filter(inside) else {
+        let Some(px) = then.map(|there| there.px) else {
             return Found { change: UNKNOWN, outdated: true, depth };
         };
+        let end = [size.width, size.height].map(|end| end as f32 - 0.01);
+        let px = [0, 1].map(|k| px[k].clamp(0.0, end[k]));
         let shown = self.around(px);
         let raw = squared(rgb, shown.nearest()).min(squared(rgb, shown.bilinear(px)));
         let outdated = raw > 3.0 * OUTDATED;
@@ -107,7 +108,18 @@ impl Reproject {
                 dx * dx + dy * dy > AT_REST_PX * AT_REST_PX
             });
         let change = if moving { shown.beyond_range(rgb) + RAW * raw } else { raw };
-        Found { change, outdated, depth }
+        let found =
+            self.found_since(sample).map_or(change, |since| change.min(squared(rgb, since)));
+        Found { change: found, outdated, depth }
+    }
+
+    /// The colour of the sample in the same cell, if it is of the same object and has been traced since the last refresh.
+    #[inline(always)]
+    fn found_since(&self, sample: &Sample) -> Option<[f32; 3]> {
+        let cell = self.store.layout.of_px(sample.px)?;
+        let is_same = self.store.object[cell] == sample.object;
+        let is_new = self.store.tick(cell).is_later_than(Tick::of(self.shown_at));
+        (is_same && is_new).then(|| self.store.record[cell].rgb())
     }
 
     /// What is shown around a position inside the picture; beyond its border, what is shown at the border.

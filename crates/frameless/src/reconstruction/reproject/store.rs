@@ -161,6 +161,14 @@ pub(super) fn words<U: Unit>(px: [F8<U>; 2], depth: F8<U>) -> [M8<U>; 2] {
     [rounded.plus(rounded).and(M8::splat(UPPER)), offset]
 }
 
+/// [`Record::depth`], eight at a time.
+#[inline(always)]
+pub(super) fn depths<U: Unit>(word: F8<U>) -> F8<U> {
+    let upper = word.to_bits().and(M8::splat(UPPER));
+    // Not below zero: the upper bit of a depth is that of its exponent.
+    upper.shifted_right::<1>().and(M8::splat(i32::MAX as u32)).as_f32()
+}
+
 /// [`Record::offset`], eight at a time.
 #[inline(always)]
 pub(super) fn offsets<U: Unit>(word: F8<U>) -> [F8<U>; 2] {
@@ -421,10 +429,12 @@ impl Store {
         }
     }
 
-    /// Takes the sample in a cell away.
+    /// Takes the sample in a cell away. (Of those that have been carried elsewhere the record stays, until another takes their cell: where a
+    /// ray has gone since the last refresh tells of what is there.)
     pub(super) fn remove(&mut self, i: usize) {
         self.touch(i);
         self.object[i] = EMPTY;
+        self.record[i] = Record::default();
     }
 
     /// Something has changed in a cell.
@@ -483,9 +493,7 @@ impl Store {
     /// The depths in the eight cells from `first` on.
     #[inline(always)]
     pub(super) fn depths<U: Unit>(&self, first: usize) -> F8<U> {
-        let upper = self.column::<U>(0, first).to_bits().and(M8::splat(UPPER));
-        // Not below zero: the upper bit of a depth is that of its exponent.
-        upper.shifted_right::<1>().and(M8::splat(i32::MAX as u32)).as_f32()
+        depths(self.column(0, first))
     }
 
     /// The ticks in the eight cells from `first` on.

@@ -2,23 +2,27 @@
 //!
 //! The samples that move are lifted out of their cells, and put down again where they are now ([`carry`]); all others stay where they
 //! are. So it is with samples that move and whose cells have been taken by new ones since the last refresh.
-//! Where two samples meet in a cell, the nearer one stays if it is nearer by 1.5 %. On the same surface the newer one stays, and
-//! the other moves to the neighbouring cell on its side, if that is empty; so it is with samples whose surface is not known.
+//! Where two samples meet in a cell, the nearer one stays if it is nearer by 1.5 %, unless a ray has gone [`past`] it. On the same surface
+//! the newer one stays, and the other moves to the neighbouring cell on its side, if that is a gap in its object: empty, and the object is
+//! beyond it, too. (At the object's edge it would make the object a pixel wider.)
 //!
 //! Bands of rows are carried side by side; a sample that leaves its band is put down when all of them have been carried. Bands are
 //! the same whatever the number of threads, and so is what comes out.
 
 mod carry;
+mod past;
 
 use std::ops::Range;
 use std::sync::Mutex;
 
 use super::cells::Cells;
-use super::store::{self, Layout, Record, SCREEN, Shading, Store, Surfel};
+use super::store::{self, Layout, Record, SCREEN, Sample, Shading, Store, Surfel};
 use crate::spare::give_back_but;
-use crate::{Pose, bands, wide};
+use crate::{bands, wide};
 
 use carry::{Band, Carry, Lifted};
+pub(super) use past::Motion;
+use past::Ray;
 
 /// Depths within this ratio belong to the same surface.
 const SAME_SURFACE: f32 = 0.015;
@@ -39,7 +43,7 @@ const CHUNK: usize = 4096;
 #[derive(Default)]
 pub(super) struct Warp {
     /// Samples that move, and whose cells others have taken since the last refresh.
-    displaced: Vec<Mover>,
+    displaced: Vec<Displaced>,
     /// How many have lost their cells at the last refresh, at the most in a band. Room for them, and for what has been lifted, is kept
     /// no longer than a refresh takes: it may be as much as a fifth of the store.
     losers: usize,
@@ -75,8 +79,15 @@ struct Moving<'a> {
     shading: &'a Shading,
 }
 
-/// Who lost its cell, and the one beside it where there may be room.
-type Loser = (u32, Mover);
+/// A sample whose cell a ray has taken.
+#[derive(Clone, Copy)]
+struct Displaced {
+    mover: Mover,
+    by: Ray,
+}
+
+/// Who lost its cell, the one beside it where there may be room, and the one beyond that.
+type Loser = ([u32; 2], Mover);
 
 impl Mover {
     #[inline(always)]
@@ -99,13 +110,13 @@ impl Warp {
     pub(super) fn run(
         &mut self,
         store: &mut Store,
-        pose: &Pose,
+        motion: &Motion<'_>,
         threads: usize,
         rests: impl Fn(u32) -> bool + Sync,
     ) {
-        let mut bands = self.carry_bands(store, pose, threads, rests);
-        self.carry_displaced(pose, threads);
-        let late = self.put_down_early(store, &mut bands);
+        let mut bands = self.carry_bands(store, motion, threads, rests);
+        self.carry_displaced(motion, threads);
+        let late = self.put_down_early(store, motion, &mut bands);
         self.losers = bands.iter().map(|band| band.losers.len()).max().unwrap_or(0);
         let of_bands = bands.iter().map(|band| &band.losers);
         of_bands.chain([&late]).for_each(|losers| step_aside(store, losers));
@@ -113,10 +124,11 @@ impl Warp {
 
     /// Takes the sample in a cell away until the next refresh: it moves, and somebody else is there now. Beyond as many as there are
     /// cells, while nobody asks for a picture, samples are lost.
-    /// `px`: of the other.
-    pub(super) fn displace(&mut self, store: &mut Store, cell: usize, px: [f32; 2]) {
+    /// `by`: the other.
+    pub(super) fn displace(&mut self, store: &mut Store, cell: usize, by: &Sample) {
         if self.displaced.len() < store.layout.len() {
-            self.displaced.push(at(&Cells::of(store), cell, px));
+            let mover = at(&Cells::of(store), cell, by.px);
+            self.displaced.push(Displaced { mover, by: Ray::of(by) });
             store.remove(cell);
         }
     }
@@ -128,7 +140,7 @@ impl Warp {
     fn carry_bands(
         &self,
         store: &mut Store,
-        pose: &Pose,
+        motion: &Motion<'_>,
         threads: usize,
         rests: impl Fn(u32) -> bool + Sync,
     ) -> Vec<Moved> {
@@ -151,19 +163,20 @@ impl Warp {
         });
         bands::run(threads, bands.collect(), |band| {
             let mut rows = with(&lifted, Vec::pop).unwrap_or_default();
-            wide::run(Carry { layout, pose, rests, band, lifted: &mut rows });
+            wide::run(Carry { layout, motion, rests, band, lifted: &mut rows });
             with(&lifted, |unused| unused.push(rows));
         });
         moved
     }
 
-    /// To where their surfaces are now, or out of the picture.
-    fn carry_displaced(&mut self, pose: &Pose, threads: usize) {
+    /// To where their surfaces are now, or out of the picture; out of it, too, if the ray that has taken their cell has gone past them.
+    fn carry_displaced(&mut self, motion: &Motion<'_>, threads: usize) {
         let chunks = self.displaced.chunks_mut(CHUNK).collect();
-        bands::run(threads, chunks, |chunk: &mut [Mover]| {
-            for mover in chunk {
+        bands::run(threads, chunks, |chunk: &mut [Displaced]| {
+            for Displaced { mover, by } in chunk {
+                let is_behind = by.is_behind(mover.record.depth(), SAME_SURFACE);
                 let surface = store::surface(mover.object, mover.primitive, &mover.surfel);
-                match pose.project(&surface) {
+                match motion.now().project(&surface) {
                     Some(there) => {
                         mover.px = there.px;
                         mover.record.set_offset(store::from_centre(there.px));
@@ -171,28 +184,38 @@ impl Warp {
                     }
                     None => mover.px = [GONE_PX; 2],
                 }
+                if is_behind && motion.is_past(by, [0.0; 2], &mover.moving()) {
+                    mover.px = [GONE_PX; 2];
+                }
             }
         });
     }
 
     /// Returns who loses a cell by that.
-    fn put_down_early(&mut self, store: &mut Store, bands: &mut [Moved]) -> Vec<Loser> {
+    fn put_down_early(
+        &mut self,
+        store: &mut Store,
+        motion: &Motion<'_>,
+        bands: &mut [Moved],
+    ) -> Vec<Loser> {
         let (displaced, losers) = (&mut self.displaced, &mut Vec::new());
         let layout = store.layout;
         let cells = &mut Cells::of(store);
         let everywhere = &(0..layout.plane as u32);
         for (cell, mover) in bands.iter_mut().flat_map(|band| band.early.drain(..)) {
-            let mut losing = Losing { layout: &layout, lifted: everywhere, first: 0, losers };
+            let mut losing =
+                Losing { layout: &layout, motion, lifted: everywhere, first: 0, losers };
             put_down(cells, cell as usize, &mover.moving(), &mut losing);
         }
-        for (i, mover) in displaced.iter().enumerate() {
+        for (i, Displaced { mover, .. }) in displaced.iter().enumerate() {
             if let Some(later) = displaced.get(i + AHEAD)
-                && let Some(cell) = layout.of_px(later.px)
+                && let Some(cell) = layout.of_px(later.mover.px)
             {
                 cells.prefetch(cell);
             }
             if let Some(cell) = layout.of_px(mover.px) {
-                let mut losing = Losing { layout: &layout, lifted: everywhere, first: 0, losers };
+                let mut losing =
+                    Losing { layout: &layout, motion, lifted: everywhere, first: 0, losers };
                 put_down(cells, cell, &mover.moving(), &mut losing);
             }
         }
@@ -203,15 +226,15 @@ impl Warp {
     }
 }
 
-/// Who lost its cell to a sample of the same surface goes to the one beside it, if that is empty.
+/// Who lost its cell goes to the one beside it, if that is a gap in its object.
 fn step_aside(store: &mut Store, losers: &[Loser]) {
     let layout = store.layout;
     let cells = &mut Cells::of(store);
-    for (i, (cell, loser)) in losers.iter().enumerate() {
-        if let Some((later, _)) = losers.get(i + AHEAD) {
+    for (i, ([cell, beyond], loser)) in losers.iter().enumerate() {
+        if let Some(([later, _], _)) = losers.get(i + AHEAD) {
             cells.prefetch(*later as usize);
         }
-        if cells.is_empty(*cell as usize) {
+        if cells.is_empty(*cell as usize) && cells.object[*beyond as usize] == loser.object {
             let (x, y) = layout.pixel_of(*cell as usize);
             let [px, py] = loser.px;
             let mut record = loser.record;
@@ -230,6 +253,7 @@ fn with<T, R>(shared: &Mutex<T>, work: impl FnOnce(&mut T) -> R) -> R {
 /// What becomes of those that lose their cells.
 struct Losing<'a> {
     layout: &'a Layout,
+    motion: &'a Motion<'a>,
     /// Cells of the first sub-grid, and those above them in others: whoever is in one of these now is there to stay, or somebody else is.
     lifted: &'a Range<u32>,
     /// The number of the first of the cells.
@@ -241,39 +265,54 @@ impl Losing<'_> {
     /// Nobody goes where somebody is already.
     #[inline(always)]
     fn push(&mut self, cells: &Cells<'_>, loser: &Mover) {
-        let Some(cell) = beside(self.layout, loser.px) else { return };
+        let Some([cell, beyond]) = beside(self.layout, loser.px) else { return };
         let is_lifted = self.lifted.contains(&(self.layout.in_plane(cell) as u32));
         if !is_lifted || cells.is_empty(cell - self.first) {
-            self.losers.push((cell as u32, *loser));
+            self.losers.push(([cell as u32, beyond as u32], *loser));
         }
     }
 }
 
-/// The cell beside the one of a position in the picture, on its side.
+/// The cell beside the one of a position in the picture, on its side, and the one beyond that.
 #[inline(always)]
-fn beside(layout: &Layout, [x, y]: [f32; 2]) -> Option<usize> {
+fn beside(layout: &Layout, [x, y]: [f32; 2]) -> Option<[usize; 2]> {
     let n = layout.per_side as f32;
     // Positions in the picture are not negative.
     let [fx, fy] = [x, y].map(|p| p * n - (p * n) as i32 as f32 - 0.5);
     let sideways = fx.abs() > fy.abs();
     let dx = if sideways { fx.signum() / n } else { 0.0 };
     let dy = if sideways { 0.0 } else { fy.signum() / n };
-    layout.of_px([x + dx, y + dy])
+    let cell = layout.of_px([x + dx, y + dy])?;
+    Some([cell, layout.of_px([x + 2.0 * dx, y + 2.0 * dy])?])
 }
 
 /// One sample to its new cell, if it stays there.
 #[inline(always)]
 fn put_down(cells: &mut Cells<'_>, cell: usize, mover: &Moving<'_>, losing: &mut Losing<'_>) {
     cells.touched.mark_px(mover.px);
+    let motion = losing.motion;
     if cells.is_empty(cell) {
-        return put(cells, cell, mover);
+        // Who was there is somewhere else now, but where its ray went is still known.
+        if !motion.last_is_past(&cells.record[cell], mover) {
+            put(cells, cell, mover);
+        }
+        return;
     }
     let (here, there) = (mover.record.depth(), cells.record[cell].depth());
     let on_screen = cells.object[cell] == SCREEN;
     if !on_screen && here < there * (1.0 - SAME_SURFACE) {
-        return put(cells, cell, mover);
+        match motion.sample_is_past(&at(cells, cell, mover.px).moving(), mover) {
+            true => losing.push(cells, &mover.mover()),
+            false => put(cells, cell, mover),
+        }
+        return;
     }
     if !on_screen && here > there * (1.0 + SAME_SURFACE) {
+        let other = at(cells, cell, mover.px);
+        if motion.sample_is_past(mover, &other.moving()) {
+            losing.push(cells, &other);
+            put(cells, cell, mover);
+        }
         return;
     }
     if mover.record.tick().is_later_than(cells.record[cell].tick()) {
@@ -315,8 +354,8 @@ fn put(cells: &mut Cells<'_>, cell: usize, mover: &Moving<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reconstruction::reproject::store::Sample;
-    use crate::{Projection, Size};
+    use crate::reconstruction::reproject::store::Tick;
+    use crate::{Pose, Projection, Size};
 
     /// Takes x of object 0 to column `scale` · x + `shift`.
     fn pose(scale: f32, shift: f32) -> Pose {
@@ -339,7 +378,7 @@ mod tests {
     fn halved(positions: &[f32]) -> Vec<Option<(u32, f32)>> {
         let mut store = Store::new(Size::new(8, 1), 1, false);
         (1..).zip(positions).for_each(|(tick, &x)| store.insert(&sample_at(x, tick), false));
-        Warp::default().run(&mut store, &pose(0.5, 0.0), 1, |_| false);
+        Warp::default().run(&mut store, &Motion::unknown(&pose(0.5, 0.0)), 1, |_| false);
         let cell = |x| store.layout.of_pixel(x, 0);
         let px = |x: i32| x as f32 + 0.5 + store.record[cell(x)].offset()[0];
         let sample = |x| (store.tick(cell(x)).0, px(x));
@@ -357,12 +396,12 @@ mod tests {
         }
         let mut warp = Warp::default();
         for (i, x) in [(old, 1.2), (gone, 7.8)] {
-            warp.displace(&mut store, i, [x, 0.9]);
+            warp.displace(&mut store, i, &Sample { px: [x, 0.9], ..sample_at(x, 2) });
             // Something at rest has been traced there.
             store.object[i] = SCREEN;
         }
         // Three to the right: one of the two leaves the picture.
-        warp.run(&mut store, &pose(1.0, 3.0), 1, |object| object == SCREEN);
+        warp.run(&mut store, &Motion::unknown(&pose(1.0, 3.0)), 1, |object| object == SCREEN);
         let now = cell(&store, 4.5);
         assert_eq!((store.object[now], store.record[now].offset()[0]), (0, 0.0));
         assert_eq!(store.shading[now].lit(), 7);
@@ -370,13 +409,58 @@ mod tests {
     }
 
     #[test]
-    fn who_loses_its_cell_steps_aside_if_there_is_room() {
-        // 0.25 and 0.75 meet in the first cell: the newer stays, the other goes to its right.
-        assert_eq!(halved(&[1.5, 0.5])[..3], [Some((2, 0.25)), Some((1, 0.75)), None]);
+    fn who_loses_its_cell_steps_aside_into_a_gap() {
+        // 0.25 and 0.75 meet in the first cell: the newer stays, the other goes to its right, since beyond that there is the object, too.
+        let [stays, aside] = [Some((2, 0.25)), Some((1, 0.75))];
+        assert_eq!(halved(&[1.5, 0.5, 4.5])[..3], [stays, aside, Some((3, 2.25))]);
         // To the left there is nothing.
         assert_eq!(halved(&[0.5, 1.5])[..2], [Some((2, 0.75)), None]);
         // And here the cell to the right is taken.
-        assert_eq!(halved(&[1.5, 0.5, 2.5])[..3], [Some((2, 0.25)), Some((3, 1.25)), None]);
+        assert_eq!(halved(&[1.5, 0.5, 2.5, 4.5])[..2], [stays, Some((3, 1.25))]);
+    }
+
+    #[test]
+    fn an_object_is_no_wider_than_its_cells() {
+        assert_eq!(halved(&[1.5, 0.5])[..3], [Some((2, 0.25)), None, None]);
+    }
+
+    /// Whether a sample of object 0 that has come to a column of the second pixel is still there, `moved` since the refresh before, after a
+    /// ray at half of that time has passed at `ray` and gone on to something twice as far away.
+    fn is_there(column: f32, moved: f32, ray: f32) -> bool {
+        let poses = [pose(1.0, 0.0), pose(1.0, -moved)];
+        let ticks = [Tick(200), Tick(100)];
+        let motion = Motion { poses: poses.each_ref(), ticks, is_known: true };
+        let mut store = Store::new(Size::new(8, 1), 1, false);
+        let mut warp = Warp::default();
+        // As at the refresh before; at depth 1.
+        let near = Sample { px: [column - moved, 0.5], ..sample_at(column, 50) };
+        let near = Sample {
+            record: Record::new(store::from_centre(near.px), 1.0, Tick(50), [0.5; 3], 0),
+            ..near
+        };
+        store.insert(&near, false);
+        let behind = Record::new(store::from_centre([ray, 0.5]), 2.0, Tick(150), [0.5; 3], 0);
+        let far = Sample { object: SCREEN, px: [ray, 0.5], record: behind, ..near };
+        let cell = store.layout.of_px(far.px).expect("inside");
+        if !store.is_empty(cell) {
+            warp.displace(&mut store, cell, &far);
+        }
+        store.insert(&far, false);
+        // What the ray has hit goes away, as a background before which the camera turns.
+        store.object[cell] = 1;
+        warp.run(&mut store, &motion, 1, |_| false);
+        !store.is_empty(store.layout.of_pixel(1, 0))
+    }
+
+    #[test]
+    fn a_ray_that_has_gone_past_an_object_tells_where_it_ends() {
+        // It rests, and the ray went through the centre, or not quite; or farther away from it than twice as far.
+        assert!(!is_there(1.2, 0.0, 1.5));
+        assert!(!is_there(1.2, 0.0, 1.9));
+        assert!(is_there(1.4, 0.0, 1.9));
+        // Carried along for half a pixel with the object, the ray's place lies beside the centre, and beyond it.
+        assert!(!is_there(1.2, 1.0, 1.1));
+        assert!(is_there(1.4, 0.8, 1.4));
     }
 
     const SIZE: Size = Size { width: 64, height: 48 };
@@ -419,7 +503,7 @@ mod tests {
         }
         let projection = Projection(projection.map(|row| row.map(|number| number as f32)));
         let pose = Pose { picture_from_object: vec![projection], ..Pose::default() };
-        Warp::default().run(&mut store, &pose, 1, |_| false);
+        Warp::default().run(&mut store, &Motion::unknown(&pose), 1, |_| false);
         let mut found = 0.0;
         for cell in (0..store.layout.len()).filter(|&cell| !store.is_empty(cell)) {
             let ((x, y), offset) = (store.layout.pixel_of(cell), store.record[cell].offset());

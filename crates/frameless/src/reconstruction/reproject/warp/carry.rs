@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{GONE_PX, Losing, Moved, Moving, NOWHERE, put_down};
+use super::{GONE_PX, Losing, Motion, Moved, Moving, NOWHERE, put_down};
 use crate::pose::BEHIND;
 use crate::reconstruction::reproject::cells::Cells;
 use crate::reconstruction::reproject::store::{self, EMPTY, Layout, Record, Shading, Surfel};
@@ -16,7 +16,7 @@ const ROWS_AHEAD: usize = 8;
 /// Carries the samples of a band of rows.
 pub(super) struct Carry<'a, F> {
     pub(super) layout: Layout,
-    pub(super) pose: &'a Pose,
+    pub(super) motion: &'a Motion<'a>,
     /// Of an object number, whether its samples stay where they are.
     pub(super) rests: &'a F,
     pub(super) band: Band<'a>,
@@ -162,7 +162,7 @@ impl<F: Fn(u32) -> bool> Carry<'_, F> {
             waiting = waiting.and(same.not());
             if !(self.rests)(object) {
                 moving = moving.either(same);
-                let now = carry_eight(cells, self.pose, object, start);
+                let now = carry_eight(cells, self.motion.now(), object, start);
                 there.px = F8::all_or(now.px, same, there.px);
                 there.depth = now.depth.or(same, there.depth);
             }
@@ -182,8 +182,8 @@ impl<F: Fn(u32) -> bool> Carry<'_, F> {
         let Band { cells, first, moved, .. } = &mut self.band;
         let Moved { early, losers } = &mut **moved;
         let here = self.layout.row(lifted.start) as u32..self.layout.row(lifted.end) as u32;
-        let (layout, first) = (&self.layout, *first);
-        let mut losing = Losing { layout, lifted: &here, first, losers };
+        let (layout, motion, first) = (&self.layout, self.motion, *first);
+        let mut losing = Losing { layout, motion, lifted: &here, first, losers };
         let row = &self.lifted.0[turn];
         for (nth, eight) in row.eights[..row.len].iter().enumerate() {
             let rest = row.rests.get(nth).unwrap_or(&PLAIN);
