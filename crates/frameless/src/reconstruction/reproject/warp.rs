@@ -4,7 +4,7 @@
 //! are. So it is with samples that move and whose cells have been taken by new ones since the last refresh.
 //! Where two samples meet in a cell, the nearer one stays if it is nearer by 1.5 %, unless a ray has gone [`past`] it. On the same surface
 //! the newer one stays, and the other moves to the neighbouring cell on its side, if that is a gap in its object: empty, and the object is
-//! beyond it, too. (At the object's edge it would make the object a pixel wider.)
+//! beyond it, too, at once or after one more empty cell. (At the object's edge it would make the object a pixel wider.)
 //!
 //! Bands of rows are carried side by side; a sample that leaves its band is put down when all of them have been carried. Bands are
 //! the same whatever the number of threads, and so is what comes out.
@@ -234,13 +234,18 @@ fn step_aside(store: &mut Store, losers: &[Loser]) {
         if let Some(([later, _], _)) = losers.get(i + AHEAD) {
             cells.prefetch(*later as usize);
         }
-        if cells.is_empty(*cell as usize) && cells.object[*beyond as usize] == loser.object {
-            let (x, y) = layout.pixel_of(*cell as usize);
+        let [cell, beyond] = [*cell, *beyond].map(|cell| cell as usize);
+        let goes_on = |cell: usize| cells.object.get(cell) == Some(&loser.object);
+        // Where samples are few a gap is two cells wide.
+        let next = (beyond + beyond).wrapping_sub(cell);
+        let is_wide = layout.per_side == 1 && cells.is_empty(beyond) && goes_on(next);
+        if cells.is_empty(cell) && (goes_on(beyond) || is_wide) {
+            let (x, y) = layout.pixel_of(cell);
             let [px, py] = loser.px;
             let mut record = loser.record;
             record.set_offset([px - x as f32 - 0.5, py - y as f32 - 0.5]);
             cells.touched.mark(x, y);
-            put(cells, *cell as usize, &Moving { record: &record, ..loser.moving() });
+            put(cells, cell, &Moving { record: &record, ..loser.moving() });
         }
     }
 }
