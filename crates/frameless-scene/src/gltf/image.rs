@@ -14,6 +14,7 @@ use super::document::Document;
 use super::error::{Fault, one_line};
 use super::json::Json;
 use super::limits::Budget;
+use super::png_chunks::picture;
 use super::uri::Uri;
 
 /// Where a picture's bytes are.
@@ -54,9 +55,17 @@ impl<'a> FileImage<'a> {
         };
         let limits = decoder_limits(&document.budget);
         let encoded = Encoded { bytes, pointer: pointer.to_owned(), limits };
-        let bytes = encoded.bytes.get(&document.views);
-        let (width, height) = encoded.decoder(bytes)?.dimensions();
-        document.budget.add_image(pointer, width, height, bytes.len())?;
+        let picture = picture(encoded.bytes.get(&document.views));
+        let decoder = encoded.decoder(&picture)?;
+        let ((width, height), decoded_bytes) = (decoder.dimensions(), decoder.total_bytes());
+        drop(decoder);
+        // Bytes that several pictures are of speak for one of them.
+        let has_been_told = match &self.source {
+            Source::View(view) => !document.budget.pictures.insert(*view),
+            _ => false,
+        };
+        let told = if has_been_told { 0 } else { picture.len() };
+        document.budget.add_image(pointer, [width, height], decoded_bytes, told)?;
         if width == 0 || height == 0 {
             return Err(Fault::at(pointer, "an image", "no pixels"));
         }
@@ -114,7 +123,8 @@ impl Encoded {
     }
 
     pub(super) fn decode(&self, views: &[View<'_>]) -> Result<Image, Fault> {
-        let decoder = self.decoder(self.bytes.get(views))?;
+        let picture = picture(self.bytes.get(views));
+        let decoder = self.decoder(&picture)?;
         let (width, height) = decoder.dimensions();
         let decoded = DynamicImage::from_decoder(decoder).map_err(|error| self.fault(&error))?;
         // In place: a copy would be the largest thing in memory.

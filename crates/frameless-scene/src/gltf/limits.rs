@@ -1,5 +1,7 @@
 //! How much a file may ask for, and what it has asked for so far.
 
+use std::collections::HashSet;
+
 use super::error::{Fault, Place, Problem};
 
 /// Bounds on what one file may make the loader read, allocate and keep. They are checked before anything is allocated,
@@ -63,6 +65,8 @@ pub(super) struct Budget {
     pixels: u64,
     thin_pixels: u64,
     keyframes: u64,
+    /// Buffer views of which a picture has been counted.
+    pub(super) pictures: HashSet<usize>,
 }
 
 impl Budget {
@@ -76,6 +80,7 @@ impl Budget {
             pixels: 0,
             thin_pixels: 0,
             keyframes: 0,
+            pictures: HashSet::new(),
         }
     }
 
@@ -119,12 +124,12 @@ impl Budget {
         spend(&mut self.keyframes, count as u64, self.limits.keyframes, "keyframes", pointer)
     }
 
-    /// An image of `width · height` texels is about to be decoded from so many bytes.
+    /// An image of `width · height` texels is about to be decoded from so many bytes, to so many.
     pub(super) fn add_image(
         &mut self,
         pointer: &str,
-        width: u32,
-        height: u32,
+        [width, height]: [u32; 2],
+        decoded_bytes: u64,
         encoded_bytes: usize,
     ) -> Result<(), Fault> {
         /// Drawings of a few flat colours have 10 to 50, a single colour a thousand.
@@ -134,7 +139,10 @@ impl Budget {
         const THIN_SHARE: u64 = 8;
         let pixels = u64::from(width) * u64::from(height);
         within(pixels, self.limits.image_pixels, "pixels in one image", pointer)?;
-        let thin = pixels.saturating_sub(PIXELS_PER_BYTE.saturating_mul(encoded_bytes as u64));
+        // Those of 16 bits per channel take as much as two.
+        let thin = pixels
+            .max(decoded_bytes / 4)
+            .saturating_sub(PIXELS_PER_BYTE.saturating_mul(encoded_bytes as u64));
         let thin_limit = self.limits.total_pixels / THIN_SHARE;
         spend(&mut self.thin_pixels, thin, thin_limit, "pixels in images of few bytes", pointer)?;
         spend(&mut self.pixels, pixels, self.limits.total_pixels, "pixels in all images", pointer)?;
@@ -226,16 +234,16 @@ mod tests {
     fn one_image_and_all_images_are_limited() {
         let limits = Limits { image_pixels: 10, total_pixels: 15, ..Limits::default() };
         let mut budget = Budget::new(&limits);
-        assert!(budget.add_image("/images/0", 11, 1, 99).is_err());
-        assert!(budget.add_image("/images/0", 5, 2, 99).is_ok());
-        assert!(budget.add_image("/images/1", 3, 2, 99).is_err());
-        assert!(budget.add_image("/images/1", u32::MAX, u32::MAX, 99).is_err());
+        assert!(budget.add_image("/images/0", [11, 1], 0, 99).is_err());
+        assert!(budget.add_image("/images/0", [5, 2], 0, 99).is_ok());
+        assert!(budget.add_image("/images/1", [3, 2], 0, 99).is_err());
+        assert!(budget.add_image("/images/1", [u32::MAX, u32::MAX], 0, 99).is_err());
     }
 
     #[test]
     fn images_of_few_bytes_are_limited_together() {
         let mut budget = Budget::new(&Limits::default());
-        let mut add = |bytes| budget.add_image("/images/0", 4096, 4096, bytes);
+        let mut add = |bytes| budget.add_image("/images/0", [4096, 4096], 4 << 24, bytes);
         for _ in 0..4 {
             assert!(add(20_000).is_ok());
         }

@@ -41,6 +41,7 @@ mod material;
 mod mesh;
 mod node;
 mod normals;
+mod png_chunks;
 mod skin;
 mod tangents;
 mod texture;

@@ -240,14 +240,62 @@ fn an_image_of_few_bytes_cannot_fill_memory() {
     assert_eq!(load(3000, 2000).images[0].width, 3000);
 }
 
-/// A grey picture, all of one colour.
+/// Whatever is in a PNG besides its picture neither takes memory nor speaks for the picture.
+#[test]
+fn what_is_not_the_picture_of_a_png_counts_for_nothing() {
+    let text = [b'a'; 2_000_000];
+    let rows = vec![0; 9000 / 8 * 8000];
+    let padded = png_of_bits(9000, 8000, &rows, &text);
+    let trailing = [flat_png(9000, 8000), text.to_vec()].concat();
+    for bytes in [padded, trailing] {
+        let scene =
+            load_bytes("i.glb", &with_image(&bytes).glb(), None, &Limits::default()).unwrap();
+        assert!(warns(&scene, "pixels in images of few bytes"), "{:?}", scene.warnings);
+    }
+    let small = png_of_bits(8, 1, &[0], &text);
+    let scene = load_bytes("i.glb", &with_image(&small).glb(), None, &Limits::default()).unwrap();
+    assert_eq!((scene.images[0].width, scene.images[0].height), (8, 1));
+    assert!(!warns(&scene, "image"), "{:?}", scene.warnings);
+}
+
+/// Pictures of one buffer view are as many pictures with the bytes of one.
+#[test]
+fn bytes_of_many_pictures_speak_for_one_of_them() {
+    let mut state = 1_u32;
+    let mut noise = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 24) as u8
+    };
+    let rows: Vec<u8> = (0..5000 / 8 * 5000).map(|_| noise()).collect();
+    let mut maker = with_image(&png_of_bits(5000, 5000, &rows, &[]));
+    let image = maker.json["images"][0].clone();
+    maker.json["materials"][0]["emissiveFactor"] = json!([1.0, 1.0, 1.0]);
+    for (index, used_as) in [(1, "normalTexture"), (2, "occlusionTexture"), (3, "emissiveTexture")]
+    {
+        maker.push("images", image.clone());
+        maker.push("textures", json!({"source": index}));
+        maker.json["materials"][0][used_as] = json!({"index": index});
+    }
+    let scene = load_bytes("i.glb", &maker.glb(), None, &Limits::default()).unwrap();
+    assert!(warns(&scene, "pixels in images of few bytes"), "{:?}", scene.warnings);
+}
+
+/// A picture all of one colour.
 fn flat_png(width: u32, height: u32) -> Vec<u8> {
+    png_of_bits(width, height, &vec![0; (width.div_ceil(8) * height) as usize], &[])
+}
+
+/// A picture of black and white, after a text.
+fn png_of_bits(width: u32, height: u32, rows: &[u8], text: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Grayscale);
     encoder.set_depth(png::BitDepth::One);
     let mut writer = encoder.write_header().unwrap();
-    writer.write_image_data(&vec![0; (width.div_ceil(8) * height) as usize]).unwrap();
+    if !text.is_empty() {
+        writer.write_chunk(png::chunk::tEXt, text).unwrap();
+    }
+    writer.write_image_data(rows).unwrap();
     writer.finish().unwrap();
     bytes
 }
