@@ -104,11 +104,14 @@ impl Default for LimitArgs {
 }
 
 impl LimitArgs {
-    /// Those that follow from others are raised with them.
+    /// Those that follow from others are raised and lowered with them.
     pub(crate) fn limits(&self) -> Limits {
-        /// No key and no value in a file takes less.
-        const BYTES_PER_VALUE: u64 = 256;
         let default = Limits::default();
+        // As many as fit.
+        let scaled = |count: u64| {
+            let scaled = u128::from(count) * u128::from(self.max_memory);
+            (scaled / u128::from(default.decoded_bytes)).try_into().unwrap_or(u64::MAX)
+        };
         Limits {
             decoded_bytes: self.max_memory,
             // A file is at most as large as what is in it, but for text.
@@ -120,8 +123,8 @@ impl LimitArgs {
             nodes: self.max_nodes,
             node_depth: self.max_nesting,
             instances: self.max_instances,
-            keyframes: default.keyframes.max(self.max_memory / BYTES_PER_VALUE),
-            json_values: default.json_values.max(self.max_memory / BYTES_PER_VALUE),
+            keyframes: scaled(default.keyframes),
+            json_values: scaled(default.json_values),
             ..default
         }
     }
@@ -134,5 +137,18 @@ mod tests {
     #[test]
     fn no_flags_mean_the_librarys_limits() {
         assert_eq!(LimitArgs::default().limits(), Limits::default());
+    }
+
+    #[test]
+    fn half_the_memory_means_half_the_values() {
+        let default = Limits::default();
+        let max_memory = default.decoded_bytes / 2;
+        let limits = LimitArgs { max_memory, ..LimitArgs::default() }.limits();
+        assert_eq!(
+            (limits.json_values, limits.keyframes),
+            (default.json_values / 2, default.keyframes / 2)
+        );
+        let most = LimitArgs { max_memory: u64::MAX, ..LimitArgs::default() }.limits();
+        assert!(most.json_values > default.json_values);
     }
 }

@@ -35,7 +35,14 @@ impl<'a> Container<'a> {
             warnings.add("the file begins with a byte order mark, which glTF forbids: skipped");
             return Ok(Container { json, json_offset: BYTE_ORDER_MARK.len(), bin: None });
         }
-        Ok(Container { json: bytes, json_offset: 0, bin: None })
+        match bytes.trim_ascii_start().first() {
+            None | Some(b'{') => Ok(Container { json: bytes, json_offset: 0, bin: None }),
+            Some(_) => Err(Fault::at_byte(
+                0,
+                "glTF: a binary file that begins with `glTF`, or JSON",
+                "other bytes",
+            )),
+        }
     }
 }
 
