@@ -251,4 +251,19 @@ mod tests {
         // Whoever has data for it may have more.
         assert!(add(1 << 20).is_ok());
     }
+
+    #[test]
+    fn images_of_16_bits_per_channel_count_twice_among_those_of_few_bytes() {
+        let mut budget = Budget::new(&Limits::default());
+        // Six are within the limit for 8 bits.
+        let mut add = |bytes_per_pixel: u64| {
+            let decoded_bytes = bytes_per_pixel * 3000 * 3000;
+            budget.add_image("/images/0", [3000, 3000], decoded_bytes, 100)
+        };
+        for _ in 0..3 {
+            assert!(add(8).is_ok());
+        }
+        assert!(add(8).is_err());
+        assert!(add(4).is_err());
+    }
 }

@@ -232,6 +232,18 @@ fn a_chain_of_huge_scales_has_no_place_in_the_world() {
 }
 
 #[test]
+fn what_is_no_gltf_is_told_by_its_first_byte() {
+    let refusal = |bytes: &[u8]| {
+        load_bytes("sky.hdr", bytes, None, &Limits::default()).unwrap_err().to_string()
+    };
+    let no_gltf = refusal(&[b"#?RADIANCE\n".as_slice(), &[b'['; 200]].concat());
+    assert!(no_gltf.contains("sky.hdr: byte 0: wanted glTF"), "{no_gltf}");
+    assert!(no_gltf.contains("other bytes"), "{no_gltf}");
+    let json = refusal(b" \n{\"asset\": 3}");
+    assert!(!json.contains("other bytes"), "{json}");
+}
+
+#[test]
 fn every_limit_is_held() {
     type Lower = fn(&mut Limits);
     let lower: [(&str, &str, Lower); 12] = [

@@ -157,8 +157,10 @@ impl Front {
     }
 
     #[inline]
-    fn wait(&mut self, tile: usize, front: &mut TileFront) {
-        if !std::mem::replace(&mut front.waits, true) {
+    fn wait(&mut self, tile: usize, front: &mut TileFront, is_wanted: bool) {
+        // Both at once: one branch that is hardly ever taken.
+        if is_wanted & !front.waits {
+            front.waits = true;
             self.waiting.push_back(tile as u32);
         }
     }
@@ -167,7 +169,7 @@ impl Front {
     pub(crate) fn suspect(&mut self, tiles: &mut Tiles, place: Place) {
         let front = &mut tiles.of_mut(place.tile()).front;
         front.suspect |= 1 << place.within();
-        self.wait(place.tile(), front);
+        self.wait(place.tile(), front, true);
     }
 
     /// Of how many seconds neighbours are left alone now.
@@ -254,10 +256,7 @@ impl QueueBeside<'_> {
         let stale = pixels & !(young << (8 * first));
         let front = &mut self.tiles.of_mut(tile).front;
         front.beside |= stale;
-        if (stale != 0) & !front.waits {
-            front.waits = true;
-            self.front.waiting.push_back(tile as u32);
-        }
+        self.front.wait(tile, front, stale != 0);
     }
 
     /// The same in the tiles to which `step` leads, as far as there are such.
