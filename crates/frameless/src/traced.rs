@@ -52,12 +52,6 @@ impl Mark {
         Mark(tick << 1)
     }
 
-    /// The same where nothing is known.
-    #[inline(always)]
-    pub(crate) fn of_unknown(self) -> Mark {
-        Mark(self.0 | 1)
-    }
-
     #[inline(always)]
     pub(crate) fn is_known(self) -> bool {
         self.0 & 1 == 0

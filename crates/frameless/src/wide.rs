@@ -74,7 +74,6 @@ pub(crate) trait Unit: Copy {
     fn plus(a: Self::M, b: Self::M) -> Self::M;
     fn minus(a: Self::M, b: Self::M) -> Self::M;
     fn times(a: Self::M, b: Self::M) -> Self::M;
-    fn packed(a: Self::M, lanes: u32) -> [u32; 8];
     fn shifted_left<const BITS: i32>(a: Self::M) -> Self::M;
     fn shifted_right<const BITS: i32>(a: Self::M) -> Self::M;
     fn to_f32(a: Self::M) -> Self::F;
@@ -292,12 +291,6 @@ impl<U: Unit> M8<U> {
         F8(U::from_bits(self.0))
     }
 
-    /// The lanes whose bit is set in `lanes`, one after the other, and something behind them.
-    #[inline(always)]
-    pub(crate) fn packed(self, lanes: u32) -> [u32; 8] {
-        U::packed(self.0, lanes)
-    }
-
     #[inline(always)]
     pub(crate) fn shifted_left<const BITS: i32>(self) -> Self {
         M8(U::shifted_left::<BITS>(self.0))
@@ -377,11 +370,6 @@ impl Offsets {
         let most = offsets.iter().copied().max().unwrap_or(0);
         Offsets { offsets, least, most }
     }
-
-    #[inline(always)]
-    pub(crate) fn len(&self) -> usize {
-        self.offsets.len()
-    }
 }
 
 /// Planes of equal length, of which eight numbers at a time are read from the same places.
@@ -444,18 +432,6 @@ impl<'a, T, const N: usize> Around<'a, T, N> {
             *eight = unsafe { eight.get_unchecked(first..first + 8) };
         }
         eights
-    }
-}
-
-impl<const N: usize> Around<'_, f32, N> {
-    /// Of every plane the eight from place `k` on.
-    #[inline(always)]
-    pub(crate) fn load<U: Unit>(&self, k: usize) -> [F8<U>; N] {
-        let (eights, mut loaded) = (self.eights(k), [F8::splat(0.0); N]);
-        for (loaded, eight) in loaded.iter_mut().zip(eights) {
-            *loaded = F8::load(eight, 0);
-        }
-        loaded
     }
 }
 
@@ -533,11 +509,6 @@ mod tests {
                 m.shifted_right::<10>(),
             ];
             self.results.extend(wholes.map(M8::lanes));
-            for lanes in 0..256 {
-                let mut packed = m.packed(lanes);
-                packed[lanes.count_ones() as usize..].fill(0);
-                self.results.push(packed);
-            }
             self.results.push([mask.bits(), mask.first().unwrap_or(8) as u32, 0, 0, 0, 0, 0, 0]);
         }
     }
@@ -557,8 +528,6 @@ mod tests {
             assert_eq!(portable, here);
             // By hand, so that not both are wrong alike.
             assert_eq!(f32::from_bits(here[0][3]), numbers[0][3] + numbers[1][3]);
-            let packed = here[here.len() - 257 + 0b1001_0010];
-            assert_eq!(packed[..4], [wholes[0][1], wholes[0][4], wholes[0][7], 0]);
             assert_eq!(here[21 + 5], std::array::from_fn(|k| wholes[0][k] & wholes[1][k]));
         }
     }

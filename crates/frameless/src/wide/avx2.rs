@@ -175,17 +175,6 @@ impl Unit for Avx2 {
     }
 
     #[inline(always)]
-    fn packed(a: __m256i, lanes: u32) -> [u32; 8] {
-        let (order, mut packed) = (&PACKED[(lanes & 255) as usize], [0; 8]);
-        unsafe {
-            let order = _mm256_loadu_si256(order.as_ptr().cast());
-            let lanes = _mm256_permutevar8x32_epi32(a, order);
-            _mm256_storeu_si256(packed.as_mut_ptr().cast(), lanes);
-        }
-        packed
-    }
-
-    #[inline(always)]
     fn shifted_left<const BITS: i32>(a: __m256i) -> __m256i {
         unsafe { _mm256_slli_epi32::<BITS>(a) }
     }
@@ -205,24 +194,6 @@ impl Unit for Avx2 {
         unsafe { _mm256_movemask_ps(_mm256_castsi256_ps(a)) as u32 }
     }
 }
-
-/// Of eight bits: the numbers of those that are set, one after the other.
-static PACKED: [[u32; 8]; 256] = {
-    let mut packed = [[0; 8]; 256];
-    let mut bits = 0;
-    while bits < 256 {
-        let (mut lane, mut len) = (0, 0);
-        while lane < 8 {
-            if bits & (1 << lane) != 0 {
-                packed[bits][len] = lane;
-                len += 1;
-            }
-            lane += 1;
-        }
-        bits += 1;
-    }
-    packed
-};
 
 /// Columns `first` to `first` + 3, half by half, since 256-bit shuffles do not cross the middle.
 ///

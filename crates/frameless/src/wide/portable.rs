@@ -160,18 +160,6 @@ impl Unit for Portable {
     }
 
     #[inline(always)]
-    fn packed(a: [u32; 8], lanes: u32) -> [u32; 8] {
-        let (mut packed, mut len) = ([0; 8], 0);
-        for (k, lane) in a.into_iter().enumerate() {
-            if lanes & (1 << k) != 0 {
-                packed[len] = lane;
-                len += 1;
-            }
-        }
-        packed
-    }
-
-    #[inline(always)]
     fn shifted_left<const BITS: i32>(a: [u32; 8]) -> [u32; 8] {
         a.map(|a| a << BITS)
     }

@@ -50,6 +50,17 @@ impl<'a> Cells<'a> {
         self.shading.get(i).copied().unwrap_or_default()
     }
 
+    /// Into a cell what few pictures need, if this one does.
+    #[inline(always)]
+    pub(super) fn put_rest(&mut self, i: usize, shading: &Shading, primitive: u32) {
+        if let Some(room) = self.shading.get_mut(i) {
+            *room = *shading;
+        }
+        if let Some(room) = self.primitive.get_mut(i) {
+            *room = primitive;
+        }
+    }
+
     /// Begins to fetch what is in a cell.
     #[inline(always)]
     pub(super) fn prefetch(&self, i: usize) {
@@ -60,6 +71,14 @@ impl<'a> Cells<'a> {
         if !self.shading.is_empty() {
             wide::prefetch(self.shading, i);
         }
+    }
+
+    /// The same of the eight cells from `start` on, but for what few pictures need.
+    #[inline(always)]
+    pub(super) fn prefetch_eight(&self, start: usize) {
+        wide::prefetch(self.object, start);
+        (0..8).step_by(2).for_each(|i| wide::prefetch(self.record, start + i));
+        (0..8).step_by(4).for_each(|i| wide::prefetch(self.surfel, start + i));
     }
 
     #[inline(always)]

@@ -362,8 +362,9 @@ mod tests {
         }
         let probed = |covers: &Covers, store: &Store| {
             let (mut waiting, mut ordered) = (Waiting::default(), Vec::new());
+            waiting.begin(&TileGrid::new(SIZE, 8));
             covers.probe(store, &mut waiting);
-            waiting.order(&TileGrid::new(SIZE, 8), &[0.01; 48], &mut ordered);
+            waiting.order(&[0.01; 48], &mut ordered);
             ordered
         };
         assert_eq!(probed(&covers, &store), [], "nothing is suspect");

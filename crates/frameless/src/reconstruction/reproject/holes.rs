@@ -12,22 +12,18 @@
 //! an area of d². What is finer than all samples shows no contrast: hence s̄. Pixels with about the same g (within a factor of
 //! two) are spread evenly over the picture; samples off their centre come last.
 
+use std::ops::Range;
+
 use crate::bayer;
-use crate::spare::{give_back, give_back_but};
+use crate::spare::give_back;
 use crate::tile::TileGrid;
+use crate::traced::TILE_PIXELS;
 
-/// Why a pixel is to be traced.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Hole {
-    /// It has no sample.
-    Unknown,
-    /// Its samples are not at its centre, and nothing moves that could have carried them there.
-    OffCentre,
-}
-
-/// So few of a rank in the picture that a refresh with few samples reaches all parts of it: 192 in 512×384.
-const BITS: u32 = 5;
-const RANKS: usize = 1 << (2 * BITS);
+/// Bayer's order of 32×32 pixels: so few of a rank in the picture that a refresh with few samples reaches all parts of it, 192 in
+/// 512×384. Of a pixel's rank the upper bits are its rank in the tile of 8×8, the lower ones that of the tile in 4×4 tiles.
+const RANKS: usize = 1 << (TILE_BITS + OF_TILES_BITS);
+const TILE_BITS: u32 = 6;
+const OF_TILES_BITS: u32 = 4;
 
 /// So much of the picture's mean contrast may be in any tile without having been seen. With 0.1 the error after a cut is 5 % higher, with
 /// 0.01 hardly lower.
@@ -39,144 +35,185 @@ const LARGEST: i32 = 10;
 
 /// Pixels that wait to be traced.
 pub(super) struct Waiting {
-    /// Of each kind.
-    found: [Vec<u32>; 2],
-    doubted: Vec<u32>,
-    /// Bayer's order of 32×32 pixels, row by row.
-    rank: [u16; RANKS],
-    /// Scratch memory: pixels' classes, and per tile how much is known.
-    classes: Vec<u8>,
-    known: Vec<u32>,
+    grid: TileGrid,
+    /// Of each tile, a bit for every pixel, row by row: those without a sample.
+    unknown: Vec<u64>,
+    /// The same: those whose samples are not at their centres, although nothing moves that could have carried them there.
+    off_centre: Vec<u64>,
+    /// Of each tile, whether nothing that is known of it counts.
+    doubted: Vec<bool>,
+    order: Order,
+    /// Scratch memory: per pixel that waits its class and rank, and per class and rank where those that have it begin.
+    keys: Vec<u16>,
+    next: Vec<u32>,
+}
+
+/// Bayer's order, to be looked up.
+struct Order {
+    /// By a row of a tile and the bits of its pixels: the bits of their ranks.
+    ranks: Box<[[u64; 256]; 8]>,
+    /// By rank: the pixel's place in its tile, row by row.
+    places: [u8; TILE_PIXELS],
+    /// Of tiles in 4×4, row by row.
+    of_tiles: [usize; 1 << OF_TILES_BITS],
+}
+
+impl Default for Order {
+    fn default() -> Order {
+        let mut order = Order {
+            ranks: Box::new([[0; 256]; 8]),
+            places: [0; TILE_PIXELS],
+            of_tiles: std::array::from_fn(|i| bayer::rank(i as u32 % 4, i as u32 / 4, 2) as usize),
+        };
+        for place in 0..TILE_PIXELS {
+            let (x, y) = (place % 8, place / 8);
+            let rank = bayer::rank(x as u32, y as u32, 3);
+            order.places[rank as usize] = place as u8;
+            let with_it =
+                order.ranks[y].iter_mut().enumerate().filter(|(bits, _)| bits >> x & 1 == 1);
+            with_it.for_each(|(_, ranks)| *ranks |= 1 << rank);
+        }
+        order
+    }
+}
+
+impl Order {
+    /// From bits of a tile's pixels, row by row, to bits of their ranks.
+    #[inline(always)]
+    fn ranks(&self, pixels: u64) -> u64 {
+        let rows = pixels.to_le_bytes();
+        let ranks = self.ranks.iter().zip(rows).map(|(ranks, row)| ranks[usize::from(row)]);
+        ranks.fold(0, |all, ranks| all | ranks)
+    }
+
+    /// The ranks in the picture of a tile's pixels, the first of them first.
+    #[inline(always)]
+    fn for_each(&self, grid: &TileGrid, tile: usize, pixels: u64, mut act: impl FnMut(usize)) {
+        let [column, row] = grid.column_and_row(tile);
+        let of_tile = self.of_tiles[(row % 4 * 4 + column % 4) as usize];
+        let mut ranks = self.ranks(pixels);
+        while ranks != 0 {
+            act(of_tile | (ranks.trailing_zeros() as usize) << OF_TILES_BITS);
+            ranks &= ranks - 1;
+        }
+    }
 }
 
 impl Default for Waiting {
     fn default() -> Waiting {
-        let side = 1 << BITS;
-        let rank = |i| bayer::rank(i as u32 % side, i as u32 / side, BITS) as u16;
         Waiting {
-            found: Default::default(),
+            grid: TileGrid::new(crate::Size::new(1, 1), 8),
+            unknown: Vec::new(),
+            off_centre: Vec::new(),
             doubted: Vec::new(),
-            rank: std::array::from_fn(rank),
-            classes: Vec::new(),
-            known: Vec::new(),
+            order: Order::default(),
+            keys: Vec::new(),
+            next: vec![0; (CLASSES + 1) * RANKS],
         }
     }
 }
 
 impl Waiting {
-    pub(super) fn clear(&mut self) {
-        self.found.iter_mut().for_each(Vec::clear);
+    /// Nobody waits. Tiles of 8×8 pixels.
+    pub(super) fn begin(&mut self, grid: &TileGrid) {
+        if self.grid != *grid {
+            self.grid = grid.clone();
+        }
+        for tiles in [&mut self.unknown, &mut self.off_centre] {
+            tiles.clear();
+            tiles.resize(grid.len(), 0);
+        }
         self.doubted.clear();
+        self.doubted.resize(grid.len(), false);
+    }
+
+    /// Of each tile, a bit for every pixel, row by row: those without a sample, and those whose samples are not at their centres.
+    pub(super) fn tiles(&mut self) -> [&mut [u64]; 2] {
+        [&mut self.unknown, &mut self.off_centre]
     }
 
     /// How many have no sample.
     pub(super) fn unknown(&self) -> usize {
-        self.found[Hole::Unknown as usize].len()
+        self.unknown.iter().map(|pixels| pixels.count_ones() as usize).sum()
     }
 
     /// A pixel that has a sample is to be traced as if it had none, and nothing else that is known of its tile counts.
     pub(super) fn doubt(&mut self, pixel: u32) {
-        self.doubted.push(pixel);
-        self.push(Hole::Unknown, &[pixel]);
+        let place = self.grid.place(pixel);
+        self.doubted[place.tile()] = true;
+        self.unknown[place.tile()] |= 1 << place.within();
     }
 
-    /// Pixels behind all of the kind that have been found so far.
-    #[inline(always)]
-    pub(super) fn push(&mut self, hole: Hole, pixels: &[u32]) {
-        self.found[hole as usize].extend_from_slice(pixels);
-    }
-
-    /// What others found after these, who keep none.
-    pub(super) fn append(&mut self, later: &mut Waiting) {
-        for (found, later) in self.found.iter_mut().zip(&mut later.found) {
-            match found.is_empty() {
-                true => std::mem::swap(found, later),
-                false => found.append(later),
-            }
-            give_back(found);
-            give_back_but(later, found.len());
-        }
-    }
-
-    /// The most urgent first; none of them waits here any more. `contrast`: of the tiles of `grid`.
-    pub(super) fn order(&mut self, grid: &TileGrid, contrast: &[f32], ordered: &mut Vec<u32>) {
+    /// The most urgent first. `contrast`: of the tiles.
+    pub(super) fn order(&mut self, contrast: &[f32], ordered: &mut Vec<u32>) {
         ordered.clear();
-        self.by_rank(Hole::Unknown, grid.size.width, ordered);
-        self.classify(grid, contrast, ordered);
-        let mut next = [0; CLASSES];
-        self.classes.iter().for_each(|&class| next[usize::from(class)] += 1);
-        add_up(&mut next);
-        // There is room for them where they were found.
-        let by_class = &mut self.found[Hole::Unknown as usize];
-        for (&pixel, &class) in ordered.iter().zip(&self.classes) {
-            let next = &mut next[usize::from(class)];
-            by_class[*next] = pixel;
-            *next += 1;
-        }
-        ordered.copy_from_slice(by_class);
-        self.classes = Vec::new();
-        self.by_rank(Hole::OffCentre, grid.size.width, ordered);
+        let keys = self.find_keys(contrast);
+        add_up(&mut self.next[keys.clone()]);
+        ordered.resize(self.keys.len(), 0);
+        self.by_key(ordered);
+        self.next[keys].fill(0);
+        self.keys = Vec::new();
         give_back(ordered);
-        self.clear();
     }
 
-    /// The classes of pixels that are traced one after the other.
-    fn classify(&mut self, grid: &TileGrid, contrast: &[f32], pixels: &[u32]) {
-        self.classes.clear();
-        if pixels.is_empty() {
-            return;
+    /// The keys of all who wait, tile by tile in the order of their ranks, and how many have each. Returns which keys there may be.
+    fn find_keys(&mut self, contrast: &[f32]) -> Range<usize> {
+        let Waiting { grid, unknown, off_centre, doubted, order, keys, next } = self;
+        let unseen = UNSEEN * contrast.iter().sum::<f32>() / contrast.len().max(1) as f32;
+        let distances = distances();
+        let [mut first, mut end] = [usize::MAX, 0];
+        let mut push = |class: usize, rank: usize| {
+            let key = class * RANKS + rank;
+            [first, end] = [first.min(key), end.max(key + 1)];
+            keys.push(key as u16);
+            next[key] += 1;
+        };
+        for tile in (0..grid.len()).filter(|&tile| unknown[tile] != 0) {
+            // As if they were traced one after the other.
+            let pixels =
+                if doubted[tile] { u64::MAX } else { !grid.pixels_of(tile) | unknown[tile] };
+            let mut farther = distances[pixels.count_zeros() as usize..].iter();
+            let s = contrast[tile] + unseen;
+            order.for_each(grid, tile, unknown[tile], |rank| {
+                let [d2, d] = farther.next().copied().unwrap_or_default();
+                push(class_of(s * d2 * d), rank);
+            });
         }
-        self.count_known(grid);
-        let mean = contrast.iter().sum::<f32>() / contrast.len() as f32;
-        for &pixel in pixels {
-            let tile = grid.tile_of(pixel);
-            let known = &mut self.known[tile];
-            let d2 = 64.0 / *known as f32;
-            *known += 1;
-            self.classes.push(class_of((contrast[tile] + UNSEEN * mean) * d2 * d2.sqrt()));
+        for tile in (0..grid.len()).filter(|&tile| off_centre[tile] != 0) {
+            order.for_each(grid, tile, off_centre[tile], |rank| push(CLASSES, rank));
         }
+        first.min(end)..end
     }
 
-    fn count_known(&mut self, grid: &TileGrid) {
-        let Waiting { found: [unknown, _], doubted, known, .. } = self;
-        known.clear();
-        known.extend((0..grid.len()).map(|tile| grid.rect(tile).pixels()));
-        unknown.iter().for_each(|&pixel| known[grid.tile_of(pixel)] -= 1);
-        doubted.iter().for_each(|&pixel| known[grid.tile_of(pixel)] = 0);
-    }
-
-    /// Behind `ordered` those of a kind, by their place in Bayer's order and then as they were found (counting sort).
-    fn by_rank(&self, kind: Hole, width: u32, ordered: &mut Vec<u32>) {
-        let (found, first) = (&self.found[kind as usize], ordered.len());
-        ordered.resize(first + found.len(), 0);
-        let of_kind = &mut ordered[first..];
-        let mut next = [0; RANKS];
-        self.with_ranks(width, found, |rank, _| next[rank] += 1);
-        add_up(&mut next);
-        self.with_ranks(width, found, |rank, pixel| {
-            of_kind[next[rank]] = pixel;
-            next[rank] += 1;
-        });
-    }
-
-    #[inline(always)]
-    fn with_ranks(&self, width: u32, pixels: &[u32], mut act: impl FnMut(usize, u32)) {
-        let mask = (1 << BITS) - 1;
-        // Most are found row by row: where the row of the last one begins, and the row.
-        let (mut row_start, mut row) = (0, 0);
-        for &pixel in pixels {
-            if pixel.wrapping_sub(row_start) >= width {
-                row = pixel / width;
-                row_start = row * width;
+    /// Counting sort: `ordered` has room for all keys, and in `next` is where those of each begin.
+    fn by_key(&mut self, ordered: &mut [u32]) {
+        let Waiting { grid, unknown, off_centre, order, keys, next, .. } = self;
+        let mut keys = keys.iter();
+        for tiles in [unknown, off_centre] {
+            for (tile, &pixels) in tiles.iter().enumerate().filter(|(_, pixels)| **pixels != 0) {
+                let (corner, mut ranks) = (grid.corner(tile), order.ranks(pixels));
+                for &key in keys.by_ref().take(pixels.count_ones() as usize) {
+                    let place = order.places[ranks.trailing_zeros() as usize % TILE_PIXELS];
+                    ranks &= ranks - 1;
+                    let next = &mut next[usize::from(key)];
+                    ordered[*next as usize] = corner + grid.step(usize::from(place));
+                    *next += 1;
+                }
             }
-            let place = ((row & mask) << BITS) | ((pixel - row_start) & mask);
-            act(self.rank[place as usize] as usize % RANKS, pixel);
         }
     }
 }
 
+/// By how many pixels of a tile are known: d² and d.
+fn distances() -> [[f32; 2]; TILE_PIXELS + 1] {
+    std::array::from_fn(|known| {
+        let d2 = TILE_PIXELS as f32 / known as f32;
+        [d2, d2.sqrt()]
+    })
+}
+
 /// From how many there are of each to where each begins.
-fn add_up(counts: &mut [usize]) {
+fn add_up(counts: &mut [u32]) {
     let mut before = 0;
     for count in counts {
         before += std::mem::replace(count, before);
@@ -184,10 +221,10 @@ fn add_up(counts: &mut [usize]) {
 }
 
 /// Of a g: 0 if it is infinite.
-fn class_of(g: f32) -> u8 {
+fn class_of(g: f32) -> usize {
     // The exponent of a positive number.
     let log2 = (g.to_bits() >> 23) as i32 - 127;
-    (LARGEST + 1 - log2).clamp(0, CLASSES as i32 - 1) as u8
+    (LARGEST + 1 - log2).clamp(0, CLASSES as i32 - 1) as usize
 }
 
 #[cfg(test)]
@@ -197,30 +234,36 @@ mod tests {
 
     const SIZE: Size = Size { width: 71, height: 48 };
 
-    /// The order of holes of some kinds.
+    fn set(tiles: &mut [u64], grid: &TileGrid, pixel: u32) {
+        let place = grid.place(pixel);
+        tiles[place.tile()] |= 1 << place.within();
+    }
+
+    /// The order of all pixels, those without a sample and the others, which are off their centres.
     fn ordered(
         size: Size,
-        kind: impl Fn(u32) -> Option<Hole>,
+        is_unknown: impl Fn(u32) -> bool,
         contrast: impl Fn(usize) -> f32,
     ) -> Vec<u32> {
         let (grid, mut waiting) = (TileGrid::new(size, 8), Waiting::default());
+        waiting.begin(&grid);
+        let [unknown, off_centre] = waiting.tiles();
         for pixel in 0..size.pixels() as u32 {
-            kind(pixel).into_iter().for_each(|kind| waiting.push(kind, &[pixel]));
+            set(if is_unknown(pixel) { &mut *unknown } else { &mut *off_centre }, &grid, pixel);
         }
         let contrast: Vec<f32> = (0..grid.len()).map(contrast).collect();
         let mut ordered = vec![7; 10_000];
-        waiting.order(&grid, &contrast, &mut ordered);
+        waiting.order(&contrast, &mut ordered);
         ordered
     }
 
     #[test]
     fn each_waits_once_and_samples_off_their_centres_come_last_evenly_spread() {
-        let kind =
-            |pixel: u32| if pixel.is_multiple_of(3) { Hole::OffCentre } else { Hole::Unknown };
-        let ordered = ordered(SIZE, |pixel| Some(kind(pixel)), |_| 0.01);
+        let is_unknown = |pixel: u32| !pixel.is_multiple_of(3);
+        let ordered = ordered(SIZE, is_unknown, |_| 0.01);
         let (unknown, off_centre) = ordered.split_at(SIZE.pixels() * 2 / 3);
-        assert!(unknown.iter().all(|&pixel| kind(pixel) == Hole::Unknown));
-        let rank = |pixel: u32| bayer::rank(pixel % 71 % 32, pixel / 71 % 32, BITS);
+        assert!(unknown.iter().all(|&pixel| is_unknown(pixel)));
+        let rank = |pixel: u32| bayer::rank(pixel % 71 % 32, pixel / 71 % 32, 5);
         assert!(off_centre.windows(2).all(|pair| rank(pair[0]) <= rank(pair[1])));
         let mut all = ordered.clone();
         all.sort_unstable();
@@ -230,7 +273,7 @@ mod tests {
     #[test]
     fn first_one_of_every_tile_then_more_where_contrast_is_greater() {
         let contrast = |tile: usize| if tile == 20 { 1.0 } else { 0.1 };
-        let ordered = ordered(SIZE, |_| Some(Hole::Unknown), contrast);
+        let ordered = ordered(SIZE, |_| true, contrast);
         let grid = TileGrid::new(SIZE, 8);
         let tiles: Vec<usize> = ordered.iter().map(|&pixel| grid.tile_of(pixel)).collect();
         let mut first = tiles[..grid.len()].to_vec();
@@ -247,17 +290,18 @@ mod tests {
     fn where_samples_are_doubted_nothing_counts_as_known() {
         // Of both tiles a pixel has no sample; in the right one four are doubted.
         let (grid, mut waiting) = (TileGrid::new(Size::new(16, 8), 8), Waiting::default());
-        waiting.push(Hole::Unknown, &[0, 8]);
+        waiting.begin(&grid);
+        [0, 8].into_iter().for_each(|pixel| set(waiting.tiles()[0], &grid, pixel));
         (12..16).for_each(|pixel| waiting.doubt(pixel));
         let mut ordered = Vec::new();
-        waiting.order(&grid, &[0.1, 0.01], &mut ordered);
+        waiting.order(&[0.1, 0.01], &mut ordered);
         assert_eq!((ordered.len(), ordered[5]), (6, 0), "{ordered:?}");
     }
 
     #[test]
     fn however_few_are_traced_of_a_large_hole_they_lie_all_over_it() {
         let (width, height) = (512u32, 384u32);
-        let ordered = ordered(Size::new(width, height), |_| Some(Hole::Unknown), |_| 0.01);
+        let ordered = ordered(Size::new(width, height), |_| true, |_| 0.01);
         let blocks = (width / 32 * height / 32) as usize;
         for part in ordered.chunks(blocks) {
             let mut reached = vec![false; blocks];

@@ -11,7 +11,6 @@ mod cells;
 mod covers;
 mod cracks;
 mod drift;
-mod fill;
 mod gather;
 mod holes;
 mod packed;
@@ -350,7 +349,7 @@ impl Reproject {
         }
         let grid = TileGrid::new(size, touched::TILE);
         tile_contrast(&self.shown, &grid, &mut self.contrast);
-        self.gather.waiting.order(&grid, &self.contrast, &mut holes);
+        self.gather.waiting.order(&self.contrast, &mut holes);
         canvas.update(refresh.now, marks, holes);
     }
 

@@ -15,9 +15,9 @@
 
 use std::ops::Range;
 
-use super::fill::Far;
 use crate::Size;
 use crate::spare::give_back;
+use crate::tile::TileGrid;
 
 /// A colour and its weight.
 type Block = [f32; 4];
@@ -44,8 +44,16 @@ struct Level {
     blocks: Vec<Block>,
     /// Of blocks smaller than tiles: how many there are in a row of a tile, as a power of two; 0: they are of the whole picture.
     side_bits: usize,
-    /// Per tile where its blocks begin.
+    /// Tiles in a row, and per tile where its blocks begin.
+    tile_columns: usize,
     first: Vec<u32>,
+}
+
+/// Pixels of large holes, a bit for every pixel of a tile, row by row.
+#[derive(Clone, Copy)]
+pub(super) struct Far<'a> {
+    pub(super) grid: &'a TileGrid,
+    pub(super) tiles: &'a [u64],
 }
 
 /// Fills large holes.
@@ -53,19 +61,14 @@ struct Level {
 pub(super) struct Smooth {
     /// From blocks of 2×2 pixels on, up to a single block.
     levels: Vec<Level>,
-    /// Per tile: whether it has holes, and whether it or one beside it has.
-    holed: Vec<bool>,
+    /// Per tile: whether it or one beside it has holes.
     near: Vec<bool>,
 }
 
 impl Smooth {
-    pub(super) fn run(&mut self, far: &Far<'_>, prior: [f32; 3], picture: &mut [[f32; 3]]) {
-        if far.pixels.is_empty() {
-            return;
-        }
-        let size = far.size;
-        self.fit(size);
-        self.find_tiles(size, &far.pixels);
+    pub(super) fn run(&mut self, far: Far<'_>, prior: [f32; 3], picture: &mut [[f32; 3]]) {
+        self.fit(far.grid.size);
+        self.find_near(far);
         self.make_room();
         self.pull_tiles(far, picture);
         for l in TILE_BITS..self.levels.len() {
@@ -75,10 +78,9 @@ impl Smooth {
         }
         let top = self.levels.last_mut().expect("a tile at least");
         top.blocks.iter_mut().for_each(|block| *block = mixed(*block, prior));
-        self.push();
-        for &pixel in &far.pixels {
-            let (x, y) = size.xy(pixel);
-            picture[pixel as usize] = self.levels[0].between(x as usize, y as usize);
+        self.push(far);
+        for tile in far.holed() {
+            self.levels[0].fill(far, tile, picture);
         }
     }
 
@@ -89,6 +91,7 @@ impl Smooth {
             level.columns = (size.width as usize).div_ceil(1 << bits);
             level.rows = (size.height as usize).div_ceil(1 << bits);
             level.side_bits = TILE_BITS.saturating_sub(bits);
+            level.tile_columns = size.width.div_ceil(1 << TILE_BITS) as usize;
             if level.side_bits == 0 {
                 level.blocks.resize(level.columns * level.rows, [0.0; 4]);
             }
@@ -110,18 +113,12 @@ impl Smooth {
         }
     }
 
-    fn find_tiles(&mut self, size: Size, far: &[u32]) {
-        let Level { columns, rows, .. } = self.levels[TILE_BITS - 1];
-        for tiles in [&mut self.holed, &mut self.near] {
-            tiles.clear();
-            tiles.resize(columns * rows, false);
-        }
-        for &pixel in far {
-            let (x, y) = size.xy(pixel);
-            self.holed[(y as usize >> TILE_BITS) * columns + (x as usize >> TILE_BITS)] = true;
-        }
+    fn find_near(&mut self, far: Far<'_>) {
+        let [columns, rows] = [far.grid.columns, far.grid.rows].map(|count| count as usize);
+        self.near.clear();
+        self.near.resize(columns * rows, false);
         let beside = |at: usize, end: usize| at.saturating_sub(1)..(at + 2).min(end);
-        for tile in (0..columns * rows).filter(|&tile| self.holed[tile]) {
+        for tile in far.holed() {
             for y in beside(tile / columns, rows) {
                 for x in beside(tile % columns, columns) {
                     self.near[y * columns + x] = true;
@@ -131,16 +128,17 @@ impl Smooth {
     }
 
     /// Up to the blocks that are tiles.
-    fn pull_tiles(&mut self, far: &Far<'_>, picture: &[[f32; 3]]) {
-        let (size, width) = (far.size, far.size.width as usize);
-        let pixel = |x: usize, y: usize| {
-            let [r, g, b] = picture[y * width + x];
-            [r, g, b, if far.has(x, y) { 0.0 } else { 1.0 }]
-        };
+    fn pull_tiles(&mut self, far: Far<'_>, picture: &[[f32; 3]]) {
+        let (size, width) = (far.grid.size, far.grid.size.width as usize);
         let (fine, tiles) = self.levels.split_at_mut(TILE_BITS - 1);
         let Level { columns, ref mut blocks, .. } = tiles[0];
         for (tile, block) in blocks.iter_mut().enumerate() {
             let (x, y) = (tile % columns, tile / columns);
+            let pixel = |x: usize, y: usize| {
+                let [r, g, b] = picture[y * width + x];
+                let is_far = far.tiles[tile] >> (y % 8 * 8 + x % 8) & 1 == 1;
+                [r, g, b, if is_far { 0.0 } else { 1.0 }]
+            };
             let xs = x << TILE_BITS..((x + 1) << TILE_BITS).min(width);
             let ys = y << TILE_BITS..((y + 1) << TILE_BITS).min(size.height as usize);
             if !self.near[tile] {
@@ -169,11 +167,8 @@ impl Smooth {
     }
 
     /// From the coarsest blocks to the finest; those smaller than tiles only in tiles with holes.
-    fn push(&mut self) {
-        let (tile_columns, tile_rows) = {
-            let tiles = &self.levels[TILE_BITS - 1];
-            (tiles.columns, tiles.rows)
-        };
+    fn push(&mut self, far: Far<'_>) {
+        let tile_columns = far.grid.columns as usize;
         for l in (0..self.levels.len() - 1).rev() {
             let (finer, coarser) = self.levels.split_at_mut(l + 1);
             let (finer, coarser) = (&mut finer[l], &coarser[0]);
@@ -182,12 +177,10 @@ impl Smooth {
                 continue;
             }
             let per_tile = 1 << (TILE_BITS - 1 - l);
-            for (y, x) in pairs(0..tile_rows, 0..tile_columns) {
-                if self.holed[y * tile_columns + x] {
-                    let blocks =
-                        |at: usize, end: usize| at * per_tile..((at + 1) * per_tile).min(end);
-                    finer.push(coarser, blocks(x, finer.columns), blocks(y, finer.rows));
-                }
+            let blocks = |at: usize, end: usize| at * per_tile..((at + 1) * per_tile).min(end);
+            for tile in far.holed() {
+                let (x, y) = (tile % tile_columns, tile / tile_columns);
+                finer.push(coarser, blocks(x, finer.columns), blocks(y, finer.rows));
             }
         }
     }
@@ -201,8 +194,8 @@ impl Level {
         if bits == 0 {
             return y * self.columns + x;
         }
-        let (columns, last) = (self.columns.div_ceil(1 << bits), (1 << bits) - 1);
-        let first = self.first[(y >> bits) * columns + (x >> bits)] as usize;
+        let last = (1 << bits) - 1;
+        let first = self.first[(y >> bits) * self.tile_columns + (x >> bits)] as usize;
         first + ((y & last) << bits | (x & last))
     }
 
@@ -234,6 +227,29 @@ impl Level {
         }
     }
 
+    /// The large holes of a tile of pixels, as [`Level::between`] has it.
+    fn fill(&self, far: Far<'_>, tile: usize, picture: &mut [[f32; 3]]) {
+        /// Blocks of a tile in a row, with one at either side.
+        const SIDE: usize = 6;
+        let [column, row] = far.grid.column_and_row(tile).map(|at| at as usize);
+        let beside = |at: usize, i: usize, end: usize| (4 * at + i).saturating_sub(1).min(end - 1);
+        let mut blocks = [[[0.0; 4]; SIDE]; SIDE];
+        for (i, blocks) in blocks.iter_mut().enumerate() {
+            for (j, block) in blocks.iter_mut().enumerate() {
+                *block = self.at(beside(column, j, self.columns), beside(row, i, self.rows));
+            }
+        }
+        let (corner, mut pixels) = (far.grid.corner(tile), far.tiles[tile]);
+        while pixels != 0 {
+            let place = pixels.trailing_zeros() as usize;
+            pixels &= pixels - 1;
+            // That of its own, and the nearer one beside it.
+            let [[x, u], [y, v]] = [place % 8, place / 8].map(|i| [i / 2 + 1, i / 2 + 2 * (i % 2)]);
+            let near = [blocks[y][x], blocks[y][u], blocks[v][x], blocks[v][u]];
+            picture[(corner + far.grid.step(place)) as usize] = interpolated(near);
+        }
+    }
+
     /// Of a block of the next coarser level.
     fn children(&self, x: usize, y: usize) -> impl Iterator<Item = Block> {
         let children = pairs(twice(y, self.rows), twice(x, self.columns));
@@ -247,9 +263,23 @@ impl Level {
             [i / 2, beside.min(end - 1)]
         };
         let ([x, u], [y, v]) = (own_and_beside(x, self.columns), own_and_beside(y, self.rows));
-        let [a, b, c, d] = [self.at(x, y), self.at(u, y), self.at(x, v), self.at(u, v)];
-        std::array::from_fn(|k| (9.0 * a[k] + 3.0 * (b[k] + c[k]) + d[k]) * (1.0 / 16.0))
+        interpolated([self.at(x, y), self.at(u, y), self.at(x, v), self.at(u, v)])
     }
+}
+
+impl Far<'_> {
+    /// Tiles with such pixels.
+    fn holed(&self) -> impl Iterator<Item = usize> {
+        self.tiles.iter().enumerate().filter(|(_, pixels)| **pixels != 0).map(|(tile, _)| tile)
+    }
+}
+
+/// Between a block, the nearer ones beside and above or below it, and the one across.
+#[inline(always)]
+fn interpolated([a, b, c, d]: [Block; 4]) -> [f32; 3] {
+    let [r, g, b, _]: Block =
+        std::array::from_fn(|k| (9.0 * a[k] + 3.0 * (b[k] + c[k]) + d[k]) * (1.0 / 16.0));
+    [r, g, b]
 }
 
 /// All (y, x), row by row.
@@ -293,12 +323,12 @@ mod tests {
     ) -> Vec<(u32, u32, f32)> {
         let pixels = 0..SIZE.pixels() as u32;
         let is_known = |&pixel: &u32| known(SIZE.xy(pixel).0, SIZE.xy(pixel).1);
-        let columns = SIZE.width.div_ceil(8);
-        let mut eights = vec![0; (columns * SIZE.height) as usize];
-        for (x, y) in pixels.clone().filter(|pixel| !is_known(pixel)).map(|pixel| SIZE.xy(pixel)) {
-            eights[(y * columns + x / 8) as usize] |= 1 << (x % 8);
+        let grid = TileGrid::new(SIZE, 8);
+        let mut tiles = vec![0; grid.len()];
+        for place in pixels.clone().filter(|pixel| !is_known(pixel)).map(|pixel| grid.place(pixel))
+        {
+            tiles[place.tile()] |= 1u64 << place.within();
         }
-        let far = Far::new(SIZE, &eights);
         let shown = |pixel| {
             let (x, y) = SIZE.xy(pixel);
             if known(x, y) { [colour(x, y); 3] } else { [f32::NAN; 3] }
@@ -306,9 +336,10 @@ mod tests {
         // What was there before counts nothing, as long as it is a number.
         let mut picture: Vec<[f32; 3]> =
             pixels.map(|pixel| shown(pixel).map(|c| if c.is_nan() { 99.0 } else { c })).collect();
-        Smooth::default().run(&far, [prior; 3], &mut picture);
-        let now = |&pixel: &u32| (SIZE.xy(pixel).0, SIZE.xy(pixel).1, picture[pixel as usize][0]);
-        far.pixels.iter().map(now).collect()
+        let far = Far { grid: &grid, tiles: &tiles };
+        Smooth::default().run(far, [prior; 3], &mut picture);
+        let now = |pixel: u32| (SIZE.xy(pixel).0, SIZE.xy(pixel).1, picture[pixel as usize][0]);
+        (0..SIZE.pixels() as u32).filter(|pixel| !is_known(pixel)).map(now).collect()
     }
 
     #[test]

@@ -281,14 +281,22 @@ impl Losing<'_> {
 /// The cell beside the one of a position in the picture, on its side, and the one beyond that.
 #[inline(always)]
 fn beside(layout: &Layout, [x, y]: [f32; 2]) -> Option<[usize; 2]> {
-    let n = layout.per_side as f32;
+    let n = layout.per_side as i32;
+    let [x, y] = [x * n as f32, y * n as f32];
     // Positions in the picture are not negative.
-    let [fx, fy] = [x, y].map(|p| p * n - (p * n) as i32 as f32 - 0.5);
-    let sideways = fx.abs() > fy.abs();
-    let dx = if sideways { fx.signum() / n } else { 0.0 };
-    let dy = if sideways { 0.0 } else { fy.signum() / n };
-    let cell = layout.of_px([x + dx, y + dy])?;
-    Some([cell, layout.of_px([x + 2.0 * dx, y + 2.0 * dy])?])
+    let [column, row] = [x as i32, y as i32];
+    let [fx, fy] = [x - column as f32 - 0.5, y - row as f32 - 0.5];
+    // Looked up, since nobody can guess it.
+    let downwards = usize::from(fx.abs() <= fy.abs());
+    let sign = ([fx, fy][downwards].to_bits() >> 31) as i32;
+    let step = 1 - 2 * sign;
+    let (at, end) = ([column, row][downwards], [layout.size.width, layout.size.height][downwards]);
+    let inside = 0..n * end as i32;
+    if !(inside.contains(&(at + step)) && inside.contains(&(at + 2 * step))) {
+        return None;
+    }
+    let [dx, dy] = [[step, 0], [0, step]][downwards];
+    Some([1, 2].map(|steps| layout.neighbour(0, 0, column + steps * dx, row + steps * dy)))
 }
 
 /// One sample to its new cell, if it stays there.
@@ -301,8 +309,16 @@ fn put_down(cells: &mut Cells<'_>, cell: usize, mover: &Moving<'_>, losing: &mut
         if !motion.last_is_past(&cells.record[cell], mover) {
             put(cells, cell, mover);
         }
-        return;
+    } else {
+        meet(cells, cell, mover, losing);
     }
+}
+
+/// One sample to a cell in which another is.
+// Few samples meet; those that do not are to be put down fast.
+#[inline(never)]
+fn meet(cells: &mut Cells<'_>, cell: usize, mover: &Moving<'_>, losing: &mut Losing<'_>) {
+    let motion = losing.motion;
     let (here, there) = (mover.record.depth(), cells.record[cell].depth());
     let on_screen = cells.object[cell] == SCREEN;
     if !on_screen && here < there * (1.0 - SAME_SURFACE) {
@@ -320,12 +336,10 @@ fn put_down(cells: &mut Cells<'_>, cell: usize, mover: &Moving<'_>, losing: &mut
         }
         return;
     }
-    if mover.record.tick().is_later_than(cells.record[cell].tick()) {
-        losing.push(cells, &at(cells, cell, mover.px));
-        put(cells, cell, mover);
-    } else {
-        losing.push(cells, &mover.mover());
-    }
+    let samples = [mover.mover(), at(cells, cell, mover.px)];
+    let later = usize::from(!mover.record.tick().is_later_than(cells.record[cell].tick()));
+    losing.push(cells, &samples[1 - later]);
+    put(cells, cell, &samples[later].moving());
 }
 
 /// The sample in a cell of the pixel at a position in the picture.
@@ -348,12 +362,7 @@ fn put(cells: &mut Cells<'_>, cell: usize, mover: &Moving<'_>) {
     cells.record[cell] = *mover.record;
     cells.surfel[cell] = *mover.surfel;
     cells.object[cell] = mover.object;
-    if let Some(shading) = cells.shading.get_mut(cell) {
-        *shading = *mover.shading;
-    }
-    if let Some(primitive) = cells.primitive.get_mut(cell) {
-        *primitive = mover.primitive;
-    }
+    cells.put_rest(cell, mover.shading, mover.primitive);
 }
 
 #[cfg(test)]

@@ -13,6 +13,9 @@ use crate::{Pose, Surface, Window};
 /// samples come to rows that have been lifted.
 const ROWS_AHEAD: usize = 8;
 
+/// So many cells later what is prefetched is lifted.
+const CELLS_AHEAD: usize = 64;
+
 /// Carries the samples of a band of rows.
 pub(super) struct Carry<'a, F> {
     pub(super) layout: Layout,
@@ -38,73 +41,87 @@ pub(super) struct Lifted([Row; ROWS_AHEAD]);
 
 #[derive(Default)]
 struct Row {
-    eights: Vec<Eight>,
+    /// So many, and room for more.
+    samples: Vec<LiftedSample>,
+    len: usize,
     /// Of these, in the same order; empty if the store has no such.
     rests: Vec<Rest>,
-    len: usize,
 }
 
-/// Eight neighbouring cells, some of whose samples have been lifted.
-#[derive(Clone, Default)]
-struct Eight {
-    /// A bit per lane: whose sample moves.
-    lanes: u32,
-    /// Where it is now; [`NOWHERE`] outside the picture.
-    cell: [u32; 8],
-    px: [[f32; 8]; 2],
-    object: [u32; 8],
+/// A sample that has been lifted, in a line of the cache.
+#[derive(Clone, Copy, Default)]
+#[repr(align(64))]
+struct LiftedSample {
     /// With the position and the depth that it has now.
-    record: [Record; 8],
-    surfel: [Surfel; 8],
+    record: Record,
+    /// Where it is now; [`NOWHERE`] outside the picture.
+    px: [f32; 2],
+    surfel: Surfel,
+    cell: u32,
+    object: u32,
 }
 
-/// What few pictures need of them, see [`store::Store`].
-#[derive(Clone, Default)]
+/// What few pictures need of it, see [`store::Store`].
+#[derive(Clone, Copy, Default)]
 struct Rest {
-    shading: [Shading; 8],
-    primitive: [u32; 8],
+    shading: Shading,
+    primitive: u32,
 }
 
 /// Of a sample without.
-const PLAIN: Rest = Rest { shading: [Shading([0.0; 6]); 8], primitive: [0; 8] };
+const PLAIN: Rest = Rest { shading: Shading([0.0; 6]), primitive: 0 };
 
-impl Eight {
+impl LiftedSample {
     #[inline(always)]
-    fn moving<'a>(&'a self, rest: &'a Rest, lane: usize) -> Moving<'a> {
-        Moving {
-            px: [self.px[0][lane], self.px[1][lane]],
-            object: self.object[lane],
-            primitive: rest.primitive[lane],
-            record: &self.record[lane],
-            surfel: &self.surfel[lane],
-            shading: &rest.shading[lane],
-        }
+    fn moving<'a>(&'a self, rest: &'a Rest) -> Moving<'a> {
+        let LiftedSample { px, object, record, surfel, .. } = self;
+        let Rest { shading, primitive } = rest;
+        Moving { px: *px, object: *object, primitive: *primitive, record, surfel, shading }
     }
 }
 
 impl Row {
-    #[inline(always)]
-    fn next(&mut self) -> &mut Eight {
-        if self.len == self.eights.len() {
-            self.eights.push(Eight::default());
-        }
-        self.len += 1;
-        &mut self.eights[self.len - 1]
+    /// For so many samples.
+    fn begin(&mut self, most: usize) {
+        self.samples.resize(most, LiftedSample::default());
+        self.len = 0;
+        self.rests.clear();
     }
 
-    /// The rest of the last eight, which are those from `start` on.
+    /// Takes the samples that are `moving` out of the eight cells from `start` on; `to`: the cells where they are now.
     #[inline(always)]
-    fn keep_rest(&mut self, cells: &Cells<'_>, start: usize) {
-        if cells.shading.is_empty() && cells.primitive.is_empty() {
-            return;
+    fn lift<U: Unit>(
+        &mut self,
+        cells: &mut Cells<'_>,
+        start: usize,
+        moving: M8<U>,
+        there: &There<U>,
+        to: M8<U>,
+    ) {
+        let objects = M8::load(cells.object, start);
+        M8::splat(EMPTY).or(moving, objects).store(cells.object, start);
+        let (lanes, object, cell) = (moving.bits(), objects.lanes(), to.lanes());
+        let [x, y] = [there.px[0].lanes(), there.px[1].lanes()];
+        let [depth, offset] = store::words(there.px, there.depth).map(M8::lanes);
+        let (records, surfels) = (&cells.record[start..start + 8], &cells.surfel[start..start + 8]);
+        let room = &mut self.samples[self.len..self.len + 8];
+        let mut len = 0;
+        for lane in 0..8 {
+            // Whoever does not move is overwritten by the next.
+            room[len % 8] = LiftedSample {
+                record: records[lane].moved(depth[lane], offset[lane]),
+                px: [x[lane], y[lane]],
+                surfel: surfels[lane],
+                cell: cell[lane],
+                object: object[lane],
+            };
+            len += (lanes >> lane & 1) as usize;
         }
-        self.rests.resize(self.rests.len().max(self.len), PLAIN);
-        let rest = &mut self.rests[self.len - 1];
-        if let Some(shading) = cells.shading.get(start..start + 8) {
-            rest.shading.copy_from_slice(shading);
-        }
-        if let Some(primitive) = cells.primitive.get(start..start + 8) {
-            rest.primitive.copy_from_slice(primitive);
+        self.len += len;
+        if !(cells.shading.is_empty() && cells.primitive.is_empty()) {
+            let rest = |i: usize| Rest { shading: cells.shading(i), primitive: cells.primitive(i) };
+            let lanes = (0..8).filter(|lane| lanes >> lane & 1 == 1);
+            self.rests.extend(lanes.map(|lane| rest(start + lane)));
         }
     }
 }
@@ -135,8 +152,8 @@ struct There<U: Unit> {
 impl<F: Fn(u32) -> bool> Carry<'_, F> {
     #[inline(always)]
     fn lift_row<U: Unit>(&mut self, y: i32, turn: usize) {
-        self.lifted.0[turn].len = 0;
-        let Layout { size, plane, .. } = self.layout;
+        let Layout { size, plane, stride, .. } = self.layout;
+        self.lifted.0[turn].begin(self.layout.subs() * stride);
         for sub in 0..self.layout.subs() {
             let row = self.layout.of_pixel(0, y) + sub * plane - self.band.first;
             for x in (0..size.width as usize).step_by(8) {
@@ -151,6 +168,7 @@ impl<F: Fn(u32) -> bool> Carry<'_, F> {
     #[inline(always)]
     fn lift_eight<U: Unit>(&mut self, start: usize, turn: usize) -> bool {
         let cells = &mut self.band.cells;
+        cells.prefetch_eight(start + CELLS_AHEAD);
         let objects = M8::<U>::load(cells.object, start);
         let mut waiting = objects.equals(M8::splat(EMPTY)).not();
         let mut moving = M8::splat(0);
@@ -169,9 +187,7 @@ impl<F: Fn(u32) -> bool> Carry<'_, F> {
         }
         if moving.any() {
             let to = cells_at(&self.layout, there.px);
-            let row = &mut self.lifted.0[turn];
-            lift(cells, start, moving, &there, to, row.next());
-            row.keep_rest(cells, start);
+            self.lifted.0[turn].lift(cells, start, moving, &there, to);
         }
         moving.any()
     }
@@ -185,45 +201,16 @@ impl<F: Fn(u32) -> bool> Carry<'_, F> {
         let (layout, motion, first) = (&self.layout, self.motion, *first);
         let mut losing = Losing { layout, motion, lifted: &here, first, losers };
         let row = &self.lifted.0[turn];
-        for (nth, eight) in row.eights[..row.len].iter().enumerate() {
-            let rest = row.rests.get(nth).unwrap_or(&PLAIN);
-            let mut lanes = eight.lanes;
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize;
-                lanes &= lanes - 1;
-                let (cell, moving) = (eight.cell[lane], eight.moving(rest, lane));
-                if here.contains(&(layout.in_plane(cell as usize) as u32)) {
-                    put_down(cells, cell as usize - first, &moving, &mut losing);
-                } else if cell != NOWHERE {
-                    early.push((cell, moving.mover()));
-                }
+        for (nth, sample) in row.samples[..row.len].iter().enumerate() {
+            let moving = sample.moving(row.rests.get(nth).unwrap_or(&PLAIN));
+            let cell = sample.cell as usize;
+            if here.contains(&(layout.in_plane(cell) as u32)) {
+                put_down(cells, cell - first, &moving, &mut losing);
+            } else if sample.cell != NOWHERE {
+                early.push((sample.cell, moving.mover()));
             }
         }
     }
-}
-
-/// Takes the samples that are `moving` out of their cells; `to`: the cells where they are now.
-#[inline(always)]
-fn lift<U: Unit>(
-    cells: &mut Cells<'_>,
-    start: usize,
-    moving: M8<U>,
-    there: &There<U>,
-    to: M8<U>,
-    eight: &mut Eight,
-) {
-    let object = M8::load(cells.object, start);
-    M8::splat(EMPTY).or(moving, object).store(cells.object, start);
-    eight.lanes = moving.bits();
-    eight.cell = to.lanes();
-    eight.object = object.lanes();
-    eight.px = [there.px[0].lanes(), there.px[1].lanes()];
-    let [depth, offset] = store::words(there.px, there.depth).map(M8::lanes);
-    let records = eight.record.iter_mut().zip(&cells.record[start..start + 8]);
-    for (lane, (record, before)) in records.enumerate() {
-        *record = before.moved(depth[lane], offset[lane]);
-    }
-    eight.surfel.copy_from_slice(&cells.surfel[start..start + 8]);
 }
 
 /// The eight samples from `start` on, as if all were of the same object.
