@@ -16,26 +16,28 @@ pub(crate) struct TileGrid {
     by_columns: Divider,
 }
 
-/// Divides by a number that is known long before; three times as fast as the processor's own division (Lemire, Kaser and
-/// Kurz 2019, "Faster remainder by direct computation").
+/// Divides by a number that is known long before, with a product and a shift (Granlund and Montgomery 1994, "Division by invariant integers
+/// using multiplication").
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Divider {
-    divisor: u32,
-    /// ⌈2⁶⁴ / divisor⌉; the quotient is then exact for every 32-bit dividend. Wraps to 0 for divisor 1.
+    /// ⌈2ᵏ / divisor⌉.
     reciprocal: u64,
+    /// k.
+    bits: u32,
 }
 
 impl Divider {
-    fn new(divisor: u32) -> Divider {
-        Divider { divisor, reciprocal: (u64::MAX / u64::from(divisor)).wrapping_add(1) }
+    /// For dividends up to `most`, which is below 2³¹.
+    fn new(divisor: u32, most: u32) -> Divider {
+        debug_assert!(most < 1 << 31);
+        // The most for which no product has more than 64 bits: 2ᵏ > most · divisor, for which all quotients are exact.
+        let bits = (most / divisor + 1).leading_zeros() + 32;
+        Divider { reciprocal: (1u64 << bits).div_ceil(u64::from(divisor)), bits }
     }
 
-    #[inline]
+    #[inline(always)]
     fn quotient(self, dividend: u32) -> u32 {
-        if self.divisor == 1 {
-            return dividend;
-        }
-        ((u128::from(self.reciprocal) * u128::from(dividend)) >> 64) as u32
+        ((self.reciprocal * u64::from(dividend)) >> self.bits) as u32
     }
 }
 
@@ -59,8 +61,10 @@ impl TileGrid {
     pub(crate) fn new(size: Size, side: u32) -> TileGrid {
         let side = side.max(1);
         let (columns, rows) = (size.width.div_ceil(side), size.height.div_ceil(side));
-        let (by_width, by_side) = (Divider::new(size.width), Divider::new(side));
-        TileGrid { size, side, columns, rows, by_width, by_side, by_columns: Divider::new(columns) }
+        let by_width = Divider::new(size.width, size.pixels() as u32);
+        let by_side = Divider::new(side, size.width.max(size.height));
+        let by_columns = Divider::new(columns, columns * rows);
+        TileGrid { size, side, columns, rows, by_width, by_side, by_columns }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -148,11 +152,18 @@ mod tests {
 
     #[test]
     fn division_is_exact() {
-        for divisor in [1, 2, 3, 7, 16, 512, 1000, 3840, 65_537, u32::MAX - 1, u32::MAX] {
-            let near = |n: u64| (n.saturating_sub(2)..n + 3).map(|n| n as u32);
-            let multiples = (0..40).map(|k| (1u64 << k) / u64::from(divisor) * u64::from(divisor));
-            for dividend in multiples.flat_map(near).chain([0, 1, u32::MAX]) {
-                assert_eq!(Divider::new(divisor).quotient(dividend), dividend / divisor);
+        const MOST: u32 = i32::MAX as u32;
+        for divisor in [1, 2, 3, 7, 16, 512, 1000, 3840, 46_340, 65_537, MOST - 1, MOST] {
+            for most in [1, 70, 4096, 5_000_000, MOST - 1, MOST] {
+                let divider = Divider::new(divisor, most);
+                let near = |n: u64| (n.saturating_sub(2)..n + 3).map(|n| n as u32);
+                let multiples =
+                    (0..31).map(|k| (1u64 << k) / u64::from(divisor) * u64::from(divisor));
+                let dividends = multiples.flat_map(near).chain([0, 1, most - 1, most]);
+                for dividend in dividends.filter(|dividend| *dividend <= most) {
+                    let quotient = dividend / divisor;
+                    assert_eq!(divider.quotient(dividend), quotient, "{dividend} / {divisor}");
+                }
             }
         }
     }
