@@ -30,7 +30,7 @@ use super::ReprojectOptions;
 use super::contrast::tile_contrast;
 use crate::rates::Rates;
 use crate::tile::TileGrid;
-use crate::wide;
+
 use crate::{
     Canvas, Display, Findings, Kept, Pose, Reconstruction, Refinement, Refresh, Request, Size, Time,
 };
@@ -73,6 +73,8 @@ pub struct Reproject {
     edges: Vec<u32>,
     covered: Vec<Vec<u32>>,
     no_rates: Option<Rates>,
+    /// Scratch memory.
+    landed: Vec<Option<residual::Landed>>,
 }
 
 impl Reproject {
@@ -105,6 +107,7 @@ impl Reproject {
             edges: Vec::new(),
             covered: Vec::new(),
             no_rates: None,
+            landed: Vec::new(),
         };
         new.begin(Size::new(1, 1));
         new
@@ -131,18 +134,13 @@ impl Reproject {
         }
     }
 
-    /// Begins to fetch what sample `i` of those kept will be compared with: samples lie all over the picture, and waiting for
-    /// memory would take longer than everything else.
+    /// Begins to fetch what is known of the pixel of sample `i` of those kept.
     #[inline(always)]
     fn prefetch(&self, kept: &Kept<'_>, i: usize) {
-        let Some(&Request { pixel, .. }) = kept.requests.get(i + AHEAD) else { return };
-        let Size { width, height } = kept.size;
+        let pixel = kept.requests[i].pixel;
         let (x, y) = kept.size.xy(pixel);
         self.store.prefetch(x, y);
         self.settled.prefetch(pixel);
-        for y in y.saturating_sub(1)..(y + 2).min(height) {
-            wide::prefetch(&self.shown, (y * width + x) as usize);
-        }
     }
 
     /// Whoever is in a new sample's cell and moves will be somewhere else at the next refresh.
@@ -183,6 +181,9 @@ impl Reproject {
 /// So many samples later what is prefetched is used.
 const AHEAD: usize = 16;
 
+/// Of so many samples at a time what they will be compared with is fetched.
+const FEW: usize = 32;
+
 /// A suspect pixel whose centre was traced later than this before is not looked at again: it shows something finer than a pixel.
 const LONG_SINCE_SECS: f64 = 0.05;
 
@@ -192,21 +193,34 @@ const MUCH_GONE: usize = 4;
 impl Reconstruction for Reproject {
     fn keep(&mut self, kept: &Kept<'_>, display: &Display, findings: &mut Findings) {
         self.fit(kept.size);
-        for i in 0..kept.requests.len() {
-            self.prefetch(kept, i);
-            if let Some(refinement) = self.refine(kept, i, display) {
-                findings.changes.push(0.0);
-                findings.refinements.resize(i, None);
-                findings.refinements.push(Some(refinement));
-                continue;
+        let mut landed = std::mem::take(&mut self.landed);
+        for first in (0..kept.requests.len()).step_by(FEW) {
+            // Samples lie all over the picture, and waiting for memory would take longer than everything else: of a few all that they will be
+            // compared with is fetched before.
+            let few = first..(first + FEW).min(kept.requests.len());
+            few.clone().for_each(|i| self.prefetch(kept, i));
+            landed.clear();
+            landed.extend(few.clone().map(|i| {
+                (kept.requests[i].sample_index == 0).then(|| self.land(kept, i, display))
+            }));
+            for i in few {
+                if let Some(refinement) = self.refine(kept, i, display) {
+                    findings.changes.push(0.0);
+                    findings.refinements.resize(i, None);
+                    findings.refinements.push(Some(refinement));
+                    continue;
+                }
+                let landed = landed[i - first].take();
+                let mut landed = landed.unwrap_or_else(|| self.land(kept, i, display));
+                let found = self.residual(&landed, kept, i, display);
+                let sample = &mut landed.sample;
+                sample.record.set_depth(found.depth);
+                self.make_room(sample);
+                self.store.insert(sample, found.outdated);
+                findings.changes.push(found.change);
             }
-            let mut sample = store::Sample::new(kept, i, display, self.options.relight);
-            let found = self.residual(&sample, kept, i, display);
-            sample.record.set_depth(found.depth);
-            self.make_room(&sample);
-            self.store.insert(&sample, found.outdated);
-            findings.changes.push(found.change);
         }
+        self.landed = landed;
     }
 
     fn aim(&self, now: Time, canvas: &Canvas, requests: &mut [Request]) {
@@ -459,6 +473,27 @@ mod tests {
             pose.picture_from_object = vec![at(0.0, 2.0), at(bar(secs), 1.0)];
             true
         }
+    }
+
+    #[test]
+    fn holes_have_been_traced_when_they_were_traced_last() {
+        let (clock, sampler) = (Clock::simulated(60_000.0), SamplerKind::ADAPTIVE.build(3));
+        let mut engine = Engine::new(Size::new(101, 45), clock, sampler, Wall::default());
+        engine.set_reconstruction(Box::new(Reproject::new(ReprojectOptions::default())));
+        let mut uncovered = 0;
+        for refresh in 1..=30 {
+            let time = Time(refresh * 1_000_000_000 / 60);
+            engine.run_until(time).expect("finite colours");
+            let before: Vec<(Time, bool)> =
+                engine.canvas().time().zip(engine.canvas().known()).collect();
+            engine.refresh(time);
+            let after = engine.canvas().time().zip(engine.canvas().known());
+            for ((was, was_known), (is, is_known)) in before.into_iter().zip(after) {
+                assert!(is_known || is == was, "{was:?} {is:?}");
+                uncovered += usize::from(was_known && !is_known);
+            }
+        }
+        assert!(uncovered > 50, "{uncovered}");
     }
 
     #[test]

@@ -8,7 +8,7 @@
 
 use super::store::{SCREEN, Sample, Tick};
 use super::{Reproject, ReprojectStage};
-use crate::{Display, Kept, Request, Size};
+use crate::{Display, Kept, Projected, Request, Size, wide};
 
 /// What a sample found.
 pub(super) struct Found {
@@ -35,21 +35,44 @@ const NOISE: f32 = 4.0;
 /// What has changed a pixel by less (Σ over the channels) has not changed its neighbours by a step of 8 bits.
 const VISIBLE: f32 = 3.0 / (255.0 * 255.0);
 
+/// A new sample, and where its surface was at the last refresh.
+pub(super) struct Landed {
+    pub(super) sample: Sample,
+    then: Option<Projected>,
+}
+
 impl Reproject {
+    /// Sample `i` of those kept. Begins to fetch what was shown of its surface.
+    #[inline(always)]
+    pub(super) fn land(&self, kept: &Kept<'_>, i: usize, display: &Display) -> Landed {
+        let sample = Sample::new(kept, i, display, self.options.relight);
+        let is_known = self.refreshes > 0 && sample.object != SCREEN;
+        let then = if is_known { self.poses[0].project(&sample.surface()) } else { None };
+        if let Some(there) = then {
+            let Size { width, height } = kept.size;
+            let [x, y] = there.px.map(|p| p as u32);
+            for y in y.saturating_sub(1)..(y + 2).min(height) {
+                wide::prefetch(&self.shown, (y * width + x.min(width - 1)) as usize);
+            }
+        }
+        Landed { sample, then }
+    }
+
     /// What sample `i` of those kept found. Takes it up if its pixel is at rest.
     pub(super) fn residual(
         &mut self,
-        sample: &Sample,
+        landed: &Landed,
         kept: &Kept<'_>,
         i: usize,
         display: &Display,
     ) -> Found {
+        let sample = &landed.sample;
         let rgb = if self.options.relight {
             self.relight.as_shown(sample, display)
         } else {
             sample.record.rgb()
         };
-        let found = self.against_shown(sample, rgb, || display.encode(kept.old[i]));
+        let found = self.against_shown(landed, rgb, || display.encode(kept.old[i]));
         let request = kept.requests[i];
         let (x, y) = kept.size.xy(request.pixel);
         if request == Request::centre(request.pixel)
@@ -83,14 +106,13 @@ impl Reproject {
         found
     }
 
-    fn against_shown(&self, sample: &Sample, rgb: [f32; 3], old: impl Fn() -> [f32; 3]) -> Found {
+    fn against_shown(&self, landed: &Landed, rgb: [f32; 3], old: impl Fn() -> [f32; 3]) -> Found {
+        let Landed { sample, then } = landed;
         if self.refreshes == 0 || sample.object == SCREEN {
             let change = squared(sample.record.rgb(), old());
             return Found { change, outdated: change > 3.0 * OUTDATED, depth: f32::INFINITY };
         }
         let size = self.store.layout.size;
-        let surface = sample.surface();
-        let then = self.poses[0].project(&surface);
         let depth = then.map_or(f32::INFINITY, |there| there.depth);
         let Some(px) = then.map(|there| there.px) else {
             return Found { change: UNKNOWN, outdated: true, depth };
@@ -103,7 +125,7 @@ impl Reproject {
         let moving = self.options.without != Some(ReprojectStage::Range)
             && self.refreshes >= 2
             && !self.settled.rests(sample.object)
-            && self.poses[1].project(&surface).is_some_and(|before| {
+            && self.poses[1].project(&sample.surface()).is_some_and(|before| {
                 let [dx, dy] = [before.px[0] - px[0], before.px[1] - px[1]];
                 dx * dx + dy * dy > AT_REST_PX * AT_REST_PX
             });
@@ -127,11 +149,20 @@ impl Reproject {
     pub(super) fn around(&self, px: [f32; 2]) -> Around {
         let Size { width, height } = self.store.layout.size;
         let (x, y) = (px[0] as u32, px[1] as u32);
-        let (left, right) = (x.saturating_sub(1), (x + 1).min(width - 1));
-        let row = |y: u32| [left, x, right].map(|x| self.shown[(y * width + x) as usize]);
+        let row = |y: u32| {
+            let row = &self.shown[(y * width) as usize..][..width as usize];
+            match row.get((x as usize).wrapping_sub(1)..x as usize + 2) {
+                Some(three) => three.as_flattened().as_chunks().0[0],
+                None => {
+                    let columns = [x.saturating_sub(1), x, (x + 1).min(width - 1)];
+                    let [a, b, c] = columns.map(|x| row[x as usize]);
+                    [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]]
+                }
+            }
+        };
         Around {
             middle: [x as f32, y as f32],
-            rgb: [row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1))],
+            rows: [row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1))],
         }
     }
 }
@@ -140,13 +171,13 @@ impl Reproject {
 pub(super) struct Around {
     /// Column and row of the one in the middle.
     middle: [f32; 2],
-    /// Row by row.
-    rgb: [[[f32; 3]; 3]; 3],
+    /// Of three pixels in a row red, green and blue, one after the other.
+    rows: [[f32; 9]; 3],
 }
 
 impl Around {
     fn nearest(&self) -> [f32; 3] {
-        self.rgb[1][1]
+        [self.rows[1][3], self.rows[1][4], self.rows[1][5]]
     }
 
     /// Interpolated between the pixels' centres.
@@ -155,25 +186,42 @@ impl Around {
         let from_centre = [px[0] - self.middle[0] - 0.5, px[1] - self.middle[1] - 0.5];
         // The first of the two columns, and of the two rows.
         let [(x, u), (y, v)] = from_centre.map(|d| if d < 0.0 { (0, d + 1.0) } else { (1, d) });
-        let [a, b] = [self.rgb[y][x], self.rgb[y][x + 1]];
-        let [c, d] = [self.rgb[y + 1][x], self.rgb[y + 1][x + 1]];
+        let [above, below] = [&self.rows[y][3 * x..3 * x + 6], &self.rows[y + 1][3 * x..3 * x + 6]];
         std::array::from_fn(|k| {
-            (a[k] * (1.0 - u) + b[k] * u) * (1.0 - v) + (c[k] * (1.0 - u) + d[k] * u) * v
+            let between = |row: &[f32]| row[k] * (1.0 - u) + row[k + 3] * u;
+            between(above) * (1.0 - v) + between(below) * v
         })
     }
 
     /// Squared distance to the range of the colours.
     #[inline(always)]
     pub(super) fn beyond_range(&self, rgb: [f32; 3]) -> f32 {
-        let (mut low, mut high) = ([f32::MAX; 3], [f32::MIN; 3]);
-        for c in self.rgb.as_flattened() {
-            for k in 0..3 {
-                low[k] = low[k].min(c[k]);
-                high[k] = high[k].max(c[k]);
+        let [mut low, mut high] = [self.rows[0]; 2];
+        for row in &self.rows[1..] {
+            for (k, &c) in row.iter().enumerate() {
+                (low[k], high[k]) = (least(low[k], c), most(high[k], c));
             }
         }
-        (0..3).map(|k| (low[k] - rgb[k]).max(rgb[k] - high[k]).max(0.0).powi(2)).sum()
+        let beyond = |k: usize| {
+            let low = least(least(low[k], low[k + 3]), low[k + 6]);
+            let high = most(most(high[k], high[k + 3]), high[k + 6]);
+            let beyond = most(most(low - rgb[k], rgb[k] - high), 0.0);
+            beyond * beyond
+        };
+        beyond(0) + beyond(1) + beyond(2)
     }
+}
+
+/// Of two numbers, neither of which is NaN: one instruction.
+#[inline(always)]
+fn least(a: f32, b: f32) -> f32 {
+    if b < a { b } else { a }
+}
+
+/// The same.
+#[inline(always)]
+fn most(a: f32, b: f32) -> f32 {
+    if b > a { b } else { a }
 }
 
 pub(super) fn squared(a: [f32; 3], b: [f32; 3]) -> f32 {
