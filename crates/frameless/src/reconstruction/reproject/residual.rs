@@ -147,23 +147,29 @@ impl Reproject {
     /// What is shown around a position inside the picture; beyond its border, what is shown at the border.
     #[inline(always)]
     pub(super) fn around(&self, px: [f32; 2]) -> Around {
-        let Size { width, height } = self.store.layout.size;
+        let height = self.store.layout.size.height;
         let (x, y) = (px[0] as u32, px[1] as u32);
-        let row = |y: u32| {
-            let row = &self.shown[(y * width) as usize..][..width as usize];
-            match row.get((x as usize).wrapping_sub(1)..x as usize + 2) {
-                Some(three) => three.as_flattened().as_chunks().0[0],
-                None => {
-                    let columns = [x.saturating_sub(1), x, (x + 1).min(width - 1)];
-                    let [a, b, c] = columns.map(|x| row[x as usize]);
-                    [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]]
-                }
-            }
-        };
         Around {
             middle: [x as f32, y as f32],
-            rows: [row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1))],
+            rows: [
+                self.three(x, y.saturating_sub(1)),
+                self.three(x, y),
+                self.three(x, (y + 1).min(height - 1)),
+            ],
         }
+    }
+
+    /// What is shown in and to both sides of pixel (x, y).
+    #[inline(always)]
+    fn three(&self, x: u32, y: u32) -> [f32; 9] {
+        let (width, column) = (self.store.layout.size.width, x as usize);
+        let row = &self.shown[(y * width) as usize..][..width as usize];
+        if let Some(three) = row.get(column.wrapping_sub(1)..column + 2) {
+            return three.as_flattened().as_chunks().0[0];
+        }
+        let columns = [column.saturating_sub(1), column, (column + 1).min(row.len() - 1)];
+        let [[a, b, c], [d, e, f], [g, h, i]] = columns.map(|column| row[column]);
+        [a, b, c, d, e, f, g, h, i]
     }
 }
 
