@@ -7,8 +7,8 @@ use glam::Vec3A;
 
 use crate::direct::Probe;
 use crate::integrator::Settings;
+use crate::many::WAVE;
 use crate::moment::Moment;
-use crate::packet::TOGETHER;
 use crate::point::Point;
 use crate::ray::Ray;
 use crate::traverse::Stack;
@@ -125,7 +125,7 @@ impl World {
         asked
     }
 
-    /// The sums of [`World::ask_lights`] for at most [`TOGETHER`] points, where there are any; shadow rays of neighbours are walked together.
+    /// The sums of [`World::ask_lights`] for at most [`WAVE`] points, where there are any; shadow rays are asked about together.
     #[inline(always)]
     pub(crate) fn ask_lights_of(
         &self,
@@ -133,20 +133,20 @@ impl World {
         points: &[Option<&Point>],
         settings: &Settings,
         stack: &mut Stack,
-    ) -> [Asked; TOGETHER] {
-        let mut asked = [Asked::NOBODY; TOGETHER];
+    ) -> [Asked; WAVE] {
+        let mut asked = [Asked::NOBODY; WAVE];
         for (index, light) in moment.lights.iter().enumerate() {
-            let mut arriving = [None; TOGETHER];
-            let (mut rays, mut count) = ([Ray::NONE; TOGETHER], 0);
+            let mut arriving = [None; WAVE];
+            let (mut rays, mut count) = ([Ray::NONE; WAVE], 0);
             for (arriving, point) in arriving.iter_mut().zip(points) {
                 let Some(point) = point else { continue };
                 *arriving = Arriving::at(point, light, settings);
                 if let Some(arriving) = arriving {
-                    rays[count % TOGETHER] = arriving.shadow_ray(point, light);
+                    rays[count % WAVE] = arriving.shadow_ray(point, light);
                     count += 1;
                 }
             }
-            let rays = &rays[..count.min(TOGETHER)];
+            let rays = &rays[..count.min(WAVE)];
             let mut passes = self.passing_of(moment, rays, reach(light), stack).into_iter();
             for (asked, arriving) in asked.iter_mut().zip(arriving) {
                 if let Some(arriving) = arriving

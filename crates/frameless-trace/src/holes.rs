@@ -7,14 +7,14 @@ use frameless_scene::{AlphaMode, Geometry, Material, Mesh, Scene};
 use glam::Vec3A;
 
 use crate::fresnel::Dielectric;
+use crate::many::{Occluded, WAVE};
 use crate::matter::{Matter, coverage};
 use crate::moment::Moment;
 use crate::numbers::{self, mixed};
-use crate::packet::TOGETHER;
 use crate::point::{Placement, Point};
 use crate::ray::{Hit, Ray};
 use crate::sift::Sieve;
-use crate::top::{Occluded, Targets};
+use crate::top::Targets;
 use crate::traverse::Stack;
 use crate::world::World;
 
@@ -61,7 +61,7 @@ impl World {
         moment.targets(self).closest(ray, stack)
     }
 
-    /// What [`World::nearest`] says of each of a few rays; neighbours are walked together. `chance`: of the ray with that index.
+    /// What [`World::nearest`] says of each of many rays. `chance`: of the ray with that index.
     #[inline(always)]
     pub(crate) fn nearest_of(
         &self,
@@ -131,7 +131,7 @@ impl World {
         self.passing_targets(moment, &moment.targets(self), (ray, t_max), through_glass, stack)
     }
 
-    /// What [`World::passing`] says of each of at most [`TOGETHER`] rays, through glass; neighbours are walked together.
+    /// What [`World::passing`] says of each of at most [`WAVE`] rays, through glass.
     #[inline(always)]
     pub(crate) fn passing_of(
         &self,
@@ -139,18 +139,19 @@ impl World {
         rays: &[Ray],
         t_max: f32,
         stack: &mut Stack,
-    ) -> [Vec3A; TOGETHER] {
+    ) -> [Vec3A; WAVE] {
         let all = moment.targets(self);
-        let Occluded { blocked, passed, is_all } = all.occluded_of(rays, t_max, stack);
+        let asks = |instance: u32| moment.placed(instance).has_holes;
+        let Occluded { blocked, passed, is_all } = all.occluded_of((rays, t_max), asks, stack);
         let rest = Targets { standing: None, ..all };
-        let mut passes = [Vec3A::ZERO; TOGETHER];
+        let mut passes = [Vec3A::ZERO; WAVE];
         for (index, (ray, passes)) in rays.iter().zip(&mut passes).enumerate() {
-            let has = |rays: u32| rays >> index & 1 != 0;
+            let has = |rays: u64| rays >> index & 1 != 0;
             if has(blocked) {
                 continue;
             }
             *passes = match has(passed) {
-                true if is_all => Vec3A::ONE,
+                true if has(is_all) => Vec3A::ONE,
                 true => self.passing_targets(moment, &rest, (ray, t_max), true, stack),
                 false => self.passing_targets(moment, &all, (ray, t_max), true, stack),
             };

@@ -10,10 +10,10 @@ use crate::kernel::Isa;
 #[cfg(target_arch = "x86_64")]
 use crate::kernel::avx2;
 use crate::lens::{self, Lens};
+use crate::many::WAVE;
 use crate::moment::Moment;
 use crate::numbers::Numbers;
 use crate::order::by_tile;
-use crate::packet::TOGETHER;
 use crate::ray::Ray;
 use crate::traverse::Stack;
 use crate::world::World;
@@ -204,13 +204,13 @@ struct Samples<'a, R, T> {
 }
 
 impl<R: Iterator<Item = Request>, T: FnMut([f32; 3], Surface)> Samples<'_, R, T> {
-    /// In groups whose first rays, and those from what they hit to lights, are walked together where it is worth it.
+    /// In waves, of whose first rays and of those from what they hit to lights many are under way at once.
     #[inline(always)]
     fn trace(self) {
         let Samples { world, moment, camera, mut requests, settings, stack, mut take } = self;
         let cone = camera.cone();
         loop {
-            let (mut asked, mut rays) = ([Request::default(); TOGETHER], [Ray::NONE; TOGETHER]);
+            let (mut asked, mut rays) = ([Request::default(); WAVE], [Ray::NONE; WAVE]);
             let mut count = 0;
             for ((to, ray), request) in asked.iter_mut().zip(&mut rays).zip(&mut requests) {
                 (*to, *ray) = (request, first_ray(camera, &request, settings));
@@ -220,7 +220,7 @@ impl<R: Iterator<Item = Request>, T: FnMut([f32; 3], Surface)> Samples<'_, R, T>
             if rays.is_empty() {
                 return;
             }
-            let mut met = [None; TOGETHER];
+            let mut met = [None; WAVE];
             let met = &mut met[..count];
             let chance = |index: usize| first_chance(&asked[index], settings);
             world.nearest_of(moment, rays, chance, met, stack);

@@ -5,8 +5,11 @@
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx2;
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod avx512;
+pub(crate) mod turns;
 
-use glam::Vec3A;
+use glam::{Vec3, Vec3A};
 
 use crate::leaf::{Leaf, MOST_TRIANGLES};
 use crate::ray::{Hit, Ray};
@@ -161,13 +164,16 @@ pub(crate) struct ShearRay {
 impl ShearRay {
     #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> ShearRay {
-        let d = ray.direction.to_array();
-        let size = d.map(f32::abs);
+        const AXES: [[usize; 3]; 4] = [[1, 2, 0], [2, 0, 1], [0, 1, 2], [0, 1, 2]];
+        let size = ray.direction.abs().to_array();
         // Which it is cannot be predicted; so nothing branches on it.
         let (x_or_y, larger) = if size[0] > size[1] { (0, size[0]) } else { (1, size[1]) };
         let z = if larger > size[2] { x_or_y } else { 2 };
-        let axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][z];
-        let shear = Vec3A::new(d[axes[0]], d[axes[1]], 1.0) / d[z];
+        // Four, so that an index can be kept inside without asking.
+        let axes = AXES[z & 3];
+        let Vec3 { x: dx, y: dy, z: dz } = ray.direction.into();
+        let d = [dx, dy, dz, dz];
+        let shear = Vec3A::new(d[axes[0] & 3], d[axes[1] & 3], 1.0) / d[z & 3];
         let shear = shear.to_array();
         ShearRay { origin: ray.origin.to_array(), axes, shear }
     }

@@ -15,11 +15,13 @@ use frameless_scene::{Geometry, Instance, Mesh, Scene};
 use glam::Affine3A;
 
 use crate::build::{Blas, Triangles, corners_at};
+use crate::kernel::turns::Turns;
 use crate::kernel::{Kernel, ShearRay, SlabRay};
 use crate::leaf::{Corner, Leaf};
 use crate::packet::{Finds, Packet, walk_together};
 use crate::ray::{Hit, Ray};
 use crate::sift::Stops;
+use crate::stream::{Ways, walk_by_turns};
 use crate::top::{Placed, take};
 use crate::traverse::{Leaves, Stack, walk};
 use crate::wide::Child;
@@ -140,6 +142,19 @@ impl Standing {
         let Blas { nodes, leaves, .. } = &self.tree;
         let which = |number| self.numbers.which(number);
         walk_together::<K>((nodes, leaves), packet, finds, stack, which)
+    }
+
+    /// Tells `finds` what the rays with these indices hit; see [`walk_by_turns`].
+    #[inline(always)]
+    pub(crate) fn walk_by_turns<T: Turns, const ANY: bool>(
+        &self,
+        rays: (&[Ray], &[u32], f32),
+        finds: &mut impl Finds,
+        ways: &mut Ways,
+    ) {
+        let Blas { nodes, leaves, .. } = &self.tree;
+        let which = |number| self.numbers.which(number);
+        walk_by_turns::<T, ANY>((nodes, leaves), rays, finds, ways, which);
     }
 
     /// Whether anything is hit before `best`, which becomes the nearest hit; with `ANY`, whichever is found first.

@@ -15,7 +15,7 @@ use crate::deforming::Deforming;
 use crate::kernel::avx2;
 use crate::kernel::{Isa, Kernel, Lanes, Portable, ShearRay, SlabRay};
 use crate::leaf::Leaf;
-use crate::packet::{Any, Nearest, Packet, TOGETHER};
+use crate::packet::Packet;
 use crate::ray::{Hit, Ray};
 use crate::sift::{NoSieve, Stops};
 use crate::sphere;
@@ -162,7 +162,7 @@ impl Top {
 
     /// Whether any of the packet's rays may meet an instance.
     #[inline(always)]
-    fn may_be_met<K: Kernel>(&self, packet: &Packet) -> bool {
+    pub(crate) fn may_be_met<K: Kernel>(&self, packet: &Packet) -> bool {
         match self.nodes.first() {
             Some(root) => packet.may_meet::<K>(root),
             None => false,
@@ -224,28 +224,6 @@ impl Targets<'_> {
         self.find::<false, _>(ray, Hit::NONE, NoSieve, stack)
     }
 
-    /// The same of many rays: neighbours that go much the same way are walked together, and `found` says of each what is found for it alone.
-    pub(crate) fn closest_of(&self, rays: &[Ray], found: &mut [Option<Hit>], stack: &mut Stack) {
-        for (rays, found) in rays.chunks(TOGETHER).zip(found.chunks_mut(TOGETHER)) {
-            let group = Group { targets: self, rays, found, stack };
-            match self.isa {
-                Isa::Portable => group.with::<Portable>(),
-                #[cfg(target_arch = "x86_64")]
-                Isa::Avx2(proof) => avx2::with(proof, group),
-            }
-        }
-    }
-
-    /// Which of at most [`TOGETHER`] rays hit anything at 0 < t < t_max.
-    pub(crate) fn occluded_of(&self, rays: &[Ray], t_max: f32, stack: &mut Stack) -> Occluded {
-        let group = Shadows { targets: self, rays, t_max, stack };
-        match self.isa {
-            Isa::Portable => group.with::<Portable>(),
-            #[cfg(target_arch = "x86_64")]
-            Isa::Avx2(proof) => avx2::with(proof, group),
-        }
-    }
-
     /// Whether anything is hit at 0 < t < t_max.
     #[inline]
     pub(crate) fn occluded(&self, ray: &Ray, t_max: f32, stack: &mut Stack) -> bool {
@@ -267,97 +245,6 @@ impl Targets<'_> {
             #[cfg(target_arch = "x86_64")]
             Isa::Avx2(proof) => avx2::with(proof, walk),
         }
-    }
-}
-
-/// What is known of rays to much the same place. Bits by ray; of the others nothing is known.
-pub(crate) struct Occluded {
-    /// Those that are stopped.
-    pub(crate) blocked: u32,
-    /// Those that nothing stops that stands.
-    pub(crate) passed: u32,
-    /// Whether nothing else is on their way.
-    pub(crate) is_all: bool,
-}
-
-/// Neighbours' ways through everything.
-struct Group<'a> {
-    targets: &'a Targets<'a>,
-    /// At most [`TOGETHER`].
-    rays: &'a [Ray],
-    found: &'a mut [Option<Hit>],
-    stack: &'a mut Stack,
-}
-
-#[cfg(target_arch = "x86_64")]
-impl avx2::Task for Group<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run(self) {
-        self.with::<avx2::Avx2>();
-    }
-}
-
-impl Group<'_> {
-    #[inline(always)]
-    fn with<K: Kernel>(self) {
-        let Group { targets, rays, found, stack } = self;
-        let mut best = [Hit::NONE; TOGETHER];
-        let (mut standing, mut is_done) = (targets.standing, false);
-        if let Some(tree) = standing
-            && let Some(mut packet) = Packet::worth::<K>(rays, f32::MAX, &mut stack.worth[0])
-        {
-            let met = tree.walk_together::<K>(&mut packet, &mut Nearest(&mut best), stack);
-            stack.worth[0].learn(met);
-            standing = None;
-            is_done = !targets.top.may_be_met::<K>(&packet);
-        }
-        let targets = &Targets { standing, ..*targets };
-        for ((ray, found), none) in rays.iter().zip(found).zip(best) {
-            *found = if is_done {
-                none.found()
-            } else {
-                Walk::<_, false> { targets, ray, none, sieve: NoSieve, stack }.with::<K>()
-            };
-        }
-    }
-}
-
-/// Neighbours' ways to much the same place.
-struct Shadows<'a> {
-    targets: &'a Targets<'a>,
-    rays: &'a [Ray],
-    t_max: f32,
-    stack: &'a mut Stack,
-}
-
-#[cfg(target_arch = "x86_64")]
-impl avx2::Task for Shadows<'_> {
-    type Output = Occluded;
-    #[inline(always)]
-    fn run(self) -> Occluded {
-        self.with::<avx2::Avx2>()
-    }
-}
-
-impl Shadows<'_> {
-    #[inline(always)]
-    fn with<K: Kernel>(self) -> Occluded {
-        let Shadows { targets, rays, t_max, stack } = self;
-        let until = Hit::none_before(t_max).t;
-        let mut known = Occluded { blocked: 0, passed: 0, is_all: false };
-        if let Some(tree) = targets.standing
-            && let Some(mut packet) = Packet::worth::<K>(rays, until, &mut stack.worth[1])
-        {
-            let asks = |instance: u32| targets.placed[instance as usize].has_holes;
-            let mut any = Any { asks, blocked: 0, doubtful: 0 };
-            let met = tree.walk_together::<K>(&mut packet, &mut any, stack);
-            stack.worth[1].learn(met);
-            known.blocked = any.blocked;
-            known.passed = !(any.blocked | any.doubtful);
-            known.is_all = !targets.top.may_be_met::<K>(&packet);
-        }
-        known
     }
 }
 

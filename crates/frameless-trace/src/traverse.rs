@@ -3,6 +3,7 @@
 use crate::kernel::{Kernel, SLAB_MARGIN, SlabRay};
 use crate::packet::Worth;
 use crate::ray::Hit;
+use crate::stream::Ways;
 use crate::wide::{Child, Node};
 
 /// Entries that one tree's traversal may put on the stack. A tree balanced by median splits of 2²⁷ leaves needs
@@ -21,6 +22,9 @@ pub(crate) struct Stack {
     length: usize,
     /// Of rays that look for what is nearest, and of those that look for anything.
     pub(crate) worth: [Worth; 2],
+    /// For rays that are walked by turns: those that are, and their memory.
+    pub(crate) alone: Vec<u32>,
+    pub(crate) ways: Ways,
 }
 
 /// A node and where the ray enters it, in one number that is larger the farther away that is: bits of floats that are not negative
@@ -51,8 +55,14 @@ impl Entry {
 
 impl Stack {
     pub(crate) fn new() -> Stack {
-        let worth = [Worth::default(); 2];
-        Stack { entries: [Entry::ROOT; ENTRIES], from: [0; ENTRIES], length: 0, worth }
+        Stack {
+            entries: [Entry::ROOT; ENTRIES],
+            from: [0; ENTRIES],
+            length: 0,
+            worth: [Worth::default(); 2],
+            alone: Vec::new(),
+            ways: Ways::default(),
+        }
     }
 
     #[inline(always)]
@@ -224,11 +234,11 @@ fn descend<K: Kernel, const ANY: bool>(
 
 /// Where a child is, of nodes and leaves that begin at `places`. Which of them it is cannot be predicted; so nothing branches on it.
 #[inline(always)]
-fn place_of(child: Child, places: [*const u8; 2]) -> *const u8 {
+pub(crate) fn place_of(child: Child, places: [*const u8; 2]) -> *const u8 {
     const NODE: u32 = size_of::<Node>().trailing_zeros();
     const WORD: u32 = size_of::<u32>().trailing_zeros();
-    let is_leaf = usize::from(child.is_leaf());
-    places[is_leaf].wrapping_add(child.place() << (NODE - (NODE - WORD) * is_leaf as u32))
+    let (from, size) = if child.is_leaf() { (places[1], WORD) } else { (places[0], NODE) };
+    from.wrapping_add(child.place() << size)
 }
 
 const _: () = assert!(size_of::<Node>().is_power_of_two());

@@ -137,6 +137,12 @@ impl Node {
         &self.counts[row % 6]
     }
 
+    /// Both rows of an axis.
+    #[inline(always)]
+    pub(crate) fn counts_of(&self, axis: usize) -> &[[u8; 8]; 2] {
+        &self.counts.as_chunks().0[axis % 3]
+    }
+
     /// The same where what is below lies farther behind: its nodes and its leaves.
     pub(crate) fn moved(mut self, nodes: usize, leaves: usize) -> Node {
         for child in self.child.iter_mut().filter(|child| **child != Node::UNUSED) {

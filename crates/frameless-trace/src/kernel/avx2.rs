@@ -10,7 +10,8 @@
 
 use std::arch::x86_64::*;
 
-use super::{Eight, Kernel, Lanes, Portable, SLAB_MARGIN_ULPS, ShearRay, SlabRay};
+use super::turns::{BoxRay, Turns, Waiting, keep_one_by_one};
+use super::{Eight, Kernel, Lanes, Portable, SLAB_MARGIN_ULPS, ShearRay, SlabRay, avx512};
 #[cfg(doc)]
 use crate::leaf::LONGEST;
 use crate::leaf::Leaf;
@@ -19,15 +20,18 @@ use crate::wide::Node;
 
 /// Proof that the processor has what [`Avx2`] needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Detected(());
+pub(crate) struct Detected {
+    /// What rays that are walked by turns take instead.
+    pub(crate) wider: Option<avx512::Detected>,
+}
 
 impl Detected {
     pub(crate) fn new() -> Option<Detected> {
-        (is_x86_feature_detected!("avx2")
+        let has_all = is_x86_feature_detected!("avx2")
             && is_x86_feature_detected!("fma")
             && is_x86_feature_detected!("bmi1")
-            && is_x86_feature_detected!("popcnt"))
-        .then_some(Detected(()))
+            && is_x86_feature_detected!("popcnt");
+        has_all.then(|| Detected { wider: avx512::Detected::new() })
     }
 }
 
@@ -175,59 +179,149 @@ impl Kernel for Avx2 {
         }
     }
 
-    /// Vertices are sheared once each, eight at a time; then every triangle picks its corners.
     #[inline(always)]
     fn triangles(leaf: Leaf<'_>, ray: &ShearRay, t_max: f32) -> Lanes {
-        let [kx, ky, kz] = ray.axes;
+        triangles::<true>(leaf, ray, t_max)
+    }
+}
+
+impl Turns for Avx2 {
+    #[inline(always)]
+    fn descend<const ANY: bool>(node: &Node, ray: &BoxRay, t_max: f32, waiting: &mut Waiting) {
         // SAFETY: see the module.
         unsafe {
-            let z = from_origin(leaf, ray, kz);
-            let x = from_origin(leaf, ray, kx);
-            let x = _mm256_sub_ps(x, _mm256_mul_ps(_mm256_set1_ps(ray.shear[0]), z));
-            let y = from_origin(leaf, ray, ky);
-            let y = _mm256_sub_ps(y, _mm256_mul_ps(_mm256_set1_ps(ray.shear[1]), z));
-            let (bc, ca) = (places(leaf.second_and_third()), places(leaf.third_and_first()));
-            let (x_bc, x_ca) = (pick(x, bc), pick(x, ca));
-            let (y_bc, y_ca) = (pick(y, bc), pick(y, ca));
-            // Cx·By − Cy·Bx and Ax·Cy − Ay·Cx.
-            let uv = _mm256_sub_ps(_mm256_mul_ps(x_ca, y_bc), _mm256_mul_ps(y_ca, x_bc));
-            let (u, v) = (low(uv), high(uv));
-            let w =
-                _mm_sub_ps(_mm_mul_ps(low(x_bc), high(y_ca)), _mm_mul_ps(low(y_bc), high(x_ca)));
-            let zero = _mm_setzero_ps();
-            let least = _mm_min_ps(u, _mm_min_ps(v, w));
-            let most = _mm_max_ps(u, _mm_max_ps(v, w));
-            let inside = _mm_or_ps(_mm_cmpge_ps(least, zero), _mm_cmple_ps(most, zero));
-            let mut lanes = Lanes::NONE;
-            if _mm_movemask_ps(inside) == 0 {
-                return lanes;
+            let reciprocal = _mm_load_ps(ray.reciprocal.as_ptr());
+            let from_ray = _mm_loadu_ps(node.origin().as_ptr());
+            let from_ray = _mm_sub_ps(from_ray, _mm_load_ps(ray.origin.as_ptr()));
+            let first = _mm_mul_ps(from_ray, reciprocal);
+            let step = _mm_mul_ps(_mm_loadu_ps(node.step().as_ptr()), reciprocal);
+            let (mut near, mut far) = (_mm256_setzero_ps(), _mm256_set1_ps(t_max));
+            for axis in 0..3 {
+                let (step, first) = (splat_axis(step, axis), splat_axis(first, axis));
+                let rows = _mm_loadu_si128(ray.rows[axis].as_ptr().cast());
+                let counts = _mm_loadu_si128(node.counts_of(axis).as_ptr().cast());
+                let enters = _mm_shuffle_epi8(counts, rows);
+                let leaves = _mm_unpackhi_epi64(enters, enters);
+                let enters = _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(enters));
+                let leaves = _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(leaves));
+                near = _mm256_max_ps(_mm256_fmadd_ps(enters, step, first), near);
+                far = _mm256_min_ps(_mm256_fmadd_ps(leaves, step, first), far);
             }
-            let on_edge = _mm_or_ps(
-                _mm_cmpeq_ps(u, zero),
-                _mm_or_ps(_mm_cmpeq_ps(v, zero), _mm_cmpeq_ps(w, zero)),
-            );
-            if _mm_movemask_ps(_mm_and_ps(inside, on_edge)) != 0 {
-                // Rare, and decided in double precision.
-                return Portable::triangles(leaf, ray, t_max);
-            }
-            let z = _mm256_mul_ps(_mm256_set1_ps(ray.shear[2]), z);
-            let (z_bc, az) = (pick(z, bc), high(pick(z, ca)));
-            let (bz, cz) = (low(z_bc), high(z_bc));
-            let determinant = _mm_add_ps(_mm_add_ps(u, v), w);
-            let inverse = _mm_div_ps(_mm_set1_ps(1.0), determinant);
-            let sum = _mm_add_ps(_mm_mul_ps(u, az), _mm_mul_ps(v, bz));
-            let t = _mm_mul_ps(_mm_add_ps(sum, _mm_mul_ps(w, cz)), inverse);
-            let in_range = _mm_and_ps(_mm_cmpgt_ps(t, zero), _mm_cmple_ps(t, _mm_set1_ps(t_max)));
-            let hit = _mm_and_ps(_mm_and_ps(inside, _mm_cmpneq_ps(determinant, zero)), in_range);
-            // Lanes without a triangle repeat the last one.
-            lanes.mask = _mm_movemask_ps(hit) as u32 & ((1 << leaf.triangles()) - 1);
-            if lanes.mask != 0 {
-                _mm_storeu_ps(lanes.t.as_mut_ptr(), t);
-                _mm_storeu_ps(lanes.v.as_mut_ptr(), _mm_mul_ps(v, inverse));
-                _mm_storeu_ps(lanes.w.as_mut_ptr(), _mm_mul_ps(w, inverse));
-            }
-            lanes
+            let [near, far] = [near, far].map(|t| _mm256_castps_si256(t));
+            let far = _mm256_add_epi32(far, _mm256_set1_epi32(SLAB_MARGIN_ULPS));
+            let child = _mm256_load_si256(node.child.as_ptr().cast());
+            let unused = _mm256_set1_epi32(Node::UNUSED.bits() as i32);
+            let misses = _mm256_cmpeq_epi32(child, unused);
+            let meets = _mm256_andnot_si256(misses, _mm256_cmpgt_epi32(far, near));
+            let count = _mm256_movemask_ps(_mm256_castsi256_ps(meets)).count_ones() as usize;
+            let slot = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+            let key = _mm256_or_si256(_mm256_andnot_si256(_mm256_set1_epi32(7), near), slot);
+            // The least are those that are not met.
+            let least = _mm256_set1_epi32(-1);
+            let key = sorted(_mm256_blendv_epi8(least, key, meets));
+            let (near_to, child_to) = waiting.free();
+            _mm256_storeu_si256(near_to.as_mut_ptr().cast(), key);
+            let child = _mm256_permutevar8x32_epi32(child, key);
+            _mm256_storeu_si256(child_to.as_mut_ptr().cast(), child);
+            waiting.set_length(waiting.length() + count);
         }
+    }
+
+    #[inline(always)]
+    fn shorten(waiting: &mut Waiting, t_max: f32) {
+        keep_one_by_one(waiting, t_max);
+    }
+
+    #[inline(always)]
+    fn hits(leaf: Leaf<'_>, ray: &ShearRay, t_max: f32) -> Lanes {
+        triangles::<true>(leaf, ray, t_max)
+    }
+
+    #[inline(always)]
+    fn ask_for(place: *const u8) {
+        Avx2::fetch(place);
+    }
+}
+
+/// Eight numbers, the largest first: a bitonic network (Batcher 1968, "Sorting Networks and Their Applications"), which turns halves around
+/// so that all of it sorts one way.
+#[inline(always)]
+pub(super) unsafe fn sorted(key: __m256i) -> __m256i {
+    macro_rules! exchange {
+        ($key:ident, $other:expr, $least:literal) => {{
+            let other = $other;
+            let (most, least) = (_mm256_max_epi32($key, other), _mm256_min_epi32($key, other));
+            _mm256_blend_epi32::<$least>(most, least)
+        }};
+    }
+    // SAFETY: see the module.
+    unsafe {
+        let key = exchange!(key, _mm256_shuffle_epi32::<0b10_11_00_01>(key), 0b1010_1010);
+        let key = exchange!(key, _mm256_shuffle_epi32::<0b00_01_10_11>(key), 0b1100_1100);
+        let key = exchange!(key, _mm256_shuffle_epi32::<0b10_11_00_01>(key), 0b1010_1010);
+        let turned = _mm256_permutevar8x32_epi32(key, _mm256_setr_epi32(7, 6, 5, 4, 3, 2, 1, 0));
+        let key = exchange!(key, turned, 0b1111_0000);
+        let key = exchange!(key, _mm256_shuffle_epi32::<0b01_00_11_10>(key), 0b1100_1100);
+        exchange!(key, _mm256_shuffle_epi32::<0b10_11_00_01>(key), 0b1010_1010)
+    }
+}
+
+/// Vertices are sheared once each, eight at a time; then every triangle picks its corners. `LEAVES_EARLY`: if none is hit, which cannot be
+/// predicted, but is worth it for who waits for the answer.
+#[inline(always)]
+pub(super) fn triangles<const LEAVES_EARLY: bool>(
+    leaf: Leaf<'_>,
+    ray: &ShearRay,
+    t_max: f32,
+) -> Lanes {
+    let [kx, ky, kz] = ray.axes;
+    // SAFETY: see the module.
+    unsafe {
+        let z = from_origin(leaf, ray, kz);
+        let x = from_origin(leaf, ray, kx);
+        let x = _mm256_sub_ps(x, _mm256_mul_ps(_mm256_set1_ps(ray.shear[0]), z));
+        let y = from_origin(leaf, ray, ky);
+        let y = _mm256_sub_ps(y, _mm256_mul_ps(_mm256_set1_ps(ray.shear[1]), z));
+        let (bc, ca) = (places(leaf.second_and_third()), places(leaf.third_and_first()));
+        let (x_bc, x_ca) = (pick(x, bc), pick(x, ca));
+        let (y_bc, y_ca) = (pick(y, bc), pick(y, ca));
+        // Cx·By − Cy·Bx and Ax·Cy − Ay·Cx.
+        let uv = _mm256_sub_ps(_mm256_mul_ps(x_ca, y_bc), _mm256_mul_ps(y_ca, x_bc));
+        let (u, v) = (low(uv), high(uv));
+        let w = _mm_sub_ps(_mm_mul_ps(low(x_bc), high(y_ca)), _mm_mul_ps(low(y_bc), high(x_ca)));
+        let zero = _mm_setzero_ps();
+        let least = _mm_min_ps(u, _mm_min_ps(v, w));
+        let most = _mm_max_ps(u, _mm_max_ps(v, w));
+        let inside = _mm_or_ps(_mm_cmpge_ps(least, zero), _mm_cmple_ps(most, zero));
+        let mut lanes = Lanes::NONE;
+        if LEAVES_EARLY && _mm_movemask_ps(inside) == 0 {
+            return lanes;
+        }
+        let on_edge = _mm_or_ps(
+            _mm_cmpeq_ps(u, zero),
+            _mm_or_ps(_mm_cmpeq_ps(v, zero), _mm_cmpeq_ps(w, zero)),
+        );
+        if _mm_movemask_ps(_mm_and_ps(inside, on_edge)) != 0 {
+            // Rare, and decided in double precision.
+            return Portable::triangles(leaf, ray, t_max);
+        }
+        let z = _mm256_mul_ps(_mm256_set1_ps(ray.shear[2]), z);
+        let (z_bc, az) = (pick(z, bc), high(pick(z, ca)));
+        let (bz, cz) = (low(z_bc), high(z_bc));
+        let determinant = _mm_add_ps(_mm_add_ps(u, v), w);
+        let inverse = _mm_div_ps(_mm_set1_ps(1.0), determinant);
+        let sum = _mm_add_ps(_mm_mul_ps(u, az), _mm_mul_ps(v, bz));
+        let t = _mm_mul_ps(_mm_add_ps(sum, _mm_mul_ps(w, cz)), inverse);
+        let in_range = _mm_and_ps(_mm_cmpgt_ps(t, zero), _mm_cmple_ps(t, _mm_set1_ps(t_max)));
+        let hit = _mm_and_ps(_mm_and_ps(inside, _mm_cmpneq_ps(determinant, zero)), in_range);
+        // Lanes without a triangle repeat the last one.
+        lanes.mask = _mm_movemask_ps(hit) as u32 & ((1 << leaf.triangles()) - 1);
+        if lanes.mask != 0 {
+            _mm_storeu_ps(lanes.t.as_mut_ptr(), t);
+            _mm_storeu_ps(lanes.v.as_mut_ptr(), _mm_mul_ps(v, inverse));
+            _mm_storeu_ps(lanes.w.as_mut_ptr(), _mm_mul_ps(w, inverse));
+        }
+        lanes
     }
 }
 
