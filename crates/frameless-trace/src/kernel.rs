@@ -51,6 +51,19 @@ impl Isa {
     }
 }
 
+#[cfg(test)]
+impl Isa {
+    /// All that this machine has.
+    pub(crate) fn all() -> Vec<Isa> {
+        let mut all = vec![Isa::Portable];
+        #[cfg(target_arch = "x86_64")]
+        if let Some(detected) = avx2::Detected::new() {
+            all.extend([detected.without_wider(), detected].map(Isa::Avx2));
+        }
+        all
+    }
+}
+
 /// Eight numbers at once. Comparisons answer with a bit per lane; none holds of NaN.
 pub(crate) trait Eight: Copy {
     fn splat(x: f32) -> Self;

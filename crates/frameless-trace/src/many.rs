@@ -17,8 +17,12 @@ use crate::stream::Ways;
 use crate::top::Targets;
 use crate::traverse::Stack;
 
-/// Rays to lights at most that are asked about at once: a bit each. Fewer: ways are empty while the last rays end.
-pub(crate) const WAVE: usize = u64::BITS as usize;
+/// Samples that are traced at once: first all their rays, then those from what they hit to a light, a bit each. Fewer: ways are empty while the
+/// last rays end.
+pub const WAVE: usize = u64::BITS as usize;
+
+/// Fewer rays than that are asked about one by one: to walk by turns takes memory that has to be made.
+const FEWEST: usize = 4;
 
 /// What is known of some rays. Bits by ray; of those that are neither blocked nor passed nothing is known.
 pub(crate) struct Occluded {
@@ -33,7 +37,7 @@ pub(crate) struct Occluded {
 impl Targets<'_> {
     /// What [`Targets::closest`] says of each ray.
     pub(crate) fn closest_of(&self, rays: &[Ray], found: &mut [Option<Hit>], stack: &mut Stack) {
-        let Some(tree) = self.standing else {
+        let Some(tree) = self.standing.filter(|_| rays.len() >= FEWEST) else {
             for (ray, found) in rays.iter().zip(found) {
                 *found = self.closest(ray, stack);
             }
@@ -75,7 +79,7 @@ impl Targets<'_> {
         stack: &mut Stack,
     ) -> Occluded {
         let mut known = Occluded { blocked: 0, passed: 0, is_all: 0 };
-        let Some(tree) = self.standing else { return known };
+        let Some(tree) = self.standing.filter(|_| rays.len() >= FEWEST) else { return known };
         let until = Hit::none_before(t_max).t;
         let mut any = Any { asks, first: 0, blocked: 0, doubtful: 0 };
         let mut alone = std::mem::take(&mut stack.alone);
@@ -196,5 +200,140 @@ impl<F: Finds, T: Turns, const ANY: bool> avx2::Task for Each<'_, F, T, ANY> {
     #[inline(always)]
     fn run(self) {
         self.tree.walk_by_turns::<T, ANY>(self.rays, self.finds, self.ways);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use frameless::Rng;
+    use frameless_scene::{Geometry, Scene, Transform, builtin};
+    use glam::Vec3;
+
+    use super::*;
+    use crate::reference::{random_rays, random_soup, ray};
+    use crate::test_scenes as scenes;
+    use crate::world::World;
+
+    /// Rays with nothing in common, and some that are none or meet edges exactly.
+    fn rays(rng: &mut Rng, count: usize) -> Vec<Ray> {
+        let mut rays = random_rays(rng, count);
+        let bad = [f32::NAN, f32::INFINITY, 3e38, 0.0, -0.0, 1e-30];
+        for all in rays.iter_mut().step_by(5) {
+            let (number, axis) = (bad[rng.below(6) as usize], rng.below(3) as usize);
+            match rng.below(4) {
+                0 => all.direction[axis] = number,
+                1 => all.origin[axis] = number,
+                2 => *all = ray(9.0 * Vec3::AXES[axis], -Vec3::AXES[axis]),
+                _ => *all = ray(Vec3::splat(number), Vec3::ZERO),
+            }
+        }
+        rays
+    }
+
+    /// All kinds of instances, surfaces that coincide, and a mesh whose edges are met.
+    fn scene() -> Arc<Scene> {
+        let mut scene = Scene::clone(&scenes::mixed());
+        let soup = random_soup(&mut Rng::new(8), 2_000, 0.3);
+        scenes::add(&mut scene, Geometry::Mesh(soup.clone()), Transform::IDENTITY);
+        scenes::add(&mut scene, Geometry::Mesh(soup), Transform::IDENTITY);
+        scenes::add(&mut scene, scenes::triangle_sphere(8, 12, 0), Transform::IDENTITY);
+        Arc::new(scene)
+    }
+
+    #[test]
+    fn each_of_many_rays_finds_what_it_finds_alone() {
+        let reference = World::with_isa(scene(), Isa::Portable);
+        for isa in Isa::all() {
+            let world = World::with_isa(scene(), isa);
+            let (moment, there) = (world.moment(0.0), reference.moment(0.0));
+            let (targets, plain) = (moment.targets(&world), there.targets(&reference));
+            let (mut stack, mut rng) = (Stack::new(), Rng::new(31));
+            let mut hits = 0;
+            for count in (0..70).chain([127, 128, 129, 1_000]) {
+                let rays = rays(&mut rng, count);
+                let mut found = vec![None; count];
+                targets.closest_of(&rays, &mut found, &mut stack);
+                for (ray, found) in rays.iter().zip(&found) {
+                    assert_eq!(*found, targets.closest(ray, &mut stack), "{isa:?}: {ray:?}");
+                    assert_eq!(*found, plain.closest(ray, &mut stack), "{isa:?}: {ray:?}");
+                    hits += usize::from(found.is_some());
+                }
+            }
+            assert!(hits > 500, "{hits}");
+        }
+    }
+
+    /// Some of the instances may let rays pass: what is said of the others has to be true all the same, and not nothing.
+    #[test]
+    fn each_of_many_rays_is_blocked_as_it_is_alone() {
+        for isa in Isa::all() {
+            let world = World::with_isa(scene(), isa);
+            let moment = world.moment(0.0);
+            let targets = moment.targets(&world);
+            let rest = Targets { standing: None, ..targets };
+            let (mut stack, mut rng) = (Stack::new(), Rng::new(32));
+            let [mut blocked, mut passed, mut unknown] = [0; 3];
+            for count in (0..=WAVE).chain([WAVE; 20]) {
+                let rays = rays(&mut rng, count);
+                let t_max = [1.0, 0.6, f32::INFINITY][rng.below(3) as usize];
+                let opaque = targets.placed.len() as u32 - if count % 3 == 0 { 3 } else { 0 };
+                let asks = |instance: u32| instance >= opaque;
+                let known = targets.occluded_of((&rays, t_max), asks, &mut stack);
+                for (index, ray) in rays.iter().enumerate() {
+                    let is_occluded = targets.occluded(ray, t_max, &mut stack);
+                    let has = |rays: u64| rays >> index & 1 != 0;
+                    if has(known.blocked) {
+                        assert!(is_occluded, "{isa:?}: {ray:?}");
+                        blocked += 1;
+                    } else if has(known.passed) {
+                        let by_rest = rest.occluded(ray, t_max, &mut stack);
+                        assert_eq!(is_occluded, by_rest, "{isa:?}: {ray:?}");
+                        assert!(!has(known.is_all) || !is_occluded, "{isa:?}: {ray:?}");
+                        passed += 1;
+                    } else {
+                        unknown += 1;
+                    }
+                }
+            }
+            let enough = blocked > 300 && passed > 300 && unknown > 10;
+            assert!(enough, "{blocked} blocked, {passed} passed, {unknown} unknown");
+        }
+    }
+
+    #[test]
+    fn what_has_moved_is_found_by_many_rays() {
+        let world = World::new(Arc::new(builtin("shadow").expect("it is built in")));
+        let mut moment = world.moment(0.5);
+        let standing = moment.targets(&world).standing.expect("something stands");
+        let moved = (0..world.scene().instances.len()).find(|&k| standing.has(k));
+        let node = world.scene().instances[moved.expect("one of them")].node as usize;
+        world.update_moment_with(0.5, &mut moment, |state| {
+            state.world_from_node[node].translation.y -= 0.1;
+        });
+        let targets = moment.targets(&world);
+        assert!(targets.standing.is_none(), "what has moved counts as standing");
+        let (mut stack, rays) = (Stack::new(), random_rays(&mut Rng::new(33), 300));
+        let mut found = vec![None; rays.len()];
+        targets.closest_of(&rays, &mut found, &mut stack);
+        let alone: Vec<_> = rays.iter().map(|ray| targets.closest(ray, &mut stack)).collect();
+        assert_eq!(found, alone);
+        assert!(found.iter().flatten().count() > 30);
+    }
+
+    /// Whatever was left behind by rays before, and without a ray at all.
+    #[test]
+    fn no_rays_find_nothing() {
+        let world = World::new(scene());
+        let moment = world.moment(0.0);
+        let (targets, mut stack) = (moment.targets(&world), Stack::new());
+        targets.closest_of(&[], &mut [], &mut stack);
+        let known = targets.occluded_of((&[], 1.0), |_| false, &mut stack);
+        assert_eq!(known.blocked, 0);
+        let nowhere = [Ray::NONE; 9];
+        let mut found = [Some(Hit::NONE); 9];
+        targets.closest_of(&nowhere, &mut found, &mut stack);
+        assert_eq!(found, [None; 9]);
     }
 }

@@ -251,6 +251,9 @@ fn a_closed_mesh_has_no_holes_at_shared_edges() {
     }
     let misses = closest(&world, &rays).iter().filter(|hit| hit.is_none()).count();
     assert_eq!(misses, 0, "of {}", rays.len());
+    let (moment, mut found) = (world.moment(0.0), vec![None; rays.len()]);
+    moment.targets(&world).closest_of(&rays, &mut found, &mut Stack::new());
+    assert!(found.iter().all(Option::is_some), "rays by turns find holes");
 }
 
 #[test]
@@ -379,7 +382,7 @@ fn rays_walked_together_find_what_each_finds_alone() {
     // Its edges are met exactly.
     scenes::add(&mut scene, scenes::triangle_sphere(8, 12, 0), Transform::IDENTITY);
     let scene = Arc::new(scene);
-    for isa in [Isa::detect(), Isa::Portable] {
+    for isa in Isa::all() {
         let world = World::with_isa(scene.clone(), isa);
         let moment = world.moment(0.0);
         let (targets, mut stack) = (moment.targets(&world), Stack::new());

@@ -9,10 +9,10 @@ use std::sync::Arc;
 
 use frameless::Size;
 use frameless_scene::{Geometry, Limits, Scene, State};
-use frameless_trace::{Caster, Hit, World};
+use frameless_trace::{Caster, WAVE, World};
 
 use self::embree::{Embree, EmbreeScene, HOW_TO_GET, Triangles};
-use self::sets::{Asks, Set, trace_ours, trace_together};
+use self::sets::{Asks, Set, Together, trace_ours, trace_together};
 use super::table::Row;
 use crate::args::BenchArgs;
 use crate::failure::Failure;
@@ -26,8 +26,9 @@ const INSTANCES: [u32; 3] = [1, 100, 10_000];
 /// t may differ by this part of itself: two ways to compute the same intersection of a ray that grazes.
 const TOLERANCE: f32 = 1e-3;
 
-/// Rows `rays.<scene>.<set>.…`: `mrays_per_sec`, and with Embree `embree_mrays_per_sec`, `ratio_to_embree`, round by round, and
-/// `mismatches`, rays with another answer; and `packet_over_single`, rays traced together against the same one by one.
+/// Rows `rays.<scene>.<set>.…`: `mrays_per_sec`, of ours as the renderer traces them, [`WAVE`] at once, and `single_mrays_per_sec`, one by one;
+/// with Embree `embree_mrays_per_sec`, one by one, `ratio_to_embree` and `single_ratio_to_embree`, round by round, and `mismatches`, rays with
+/// another answer; and `packet_over_single`, ours at once against ours one by one.
 pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
     let named = args.embree.as_deref();
     let embree = Embree::find(named).map_err(|e| Failure::bad_input(anyhow::anyhow!(e)))?;
@@ -115,26 +116,35 @@ impl Bench<'_> {
         let moment = world.moment(0.0);
         let mut caster = world.caster(&moment);
         let mut found = [vec![0.0; set.rays.len()], vec![0.0; set.rays.len()]];
-        let [ours_found, theirs_found] = &mut found;
+        let [alone_found, theirs_found] = &mut found;
+        let mut ours_found = Together::of(set);
         let mut speeds = Speeds::default();
         for round in 0..self.args.rounds {
-            let ours = |caster: &mut Caster<'_>, found: &mut [f32]| {
-                mrays_per_sec(set, || trace_ours(caster, set, found))
+            let ours = |caster: &mut Caster<'_>, found: &mut Together| {
+                mrays_per_sec(set, || trace_together(caster, set, found))
             };
             let other = |found: &mut [f32]| {
                 theirs.map(|theirs| mrays_per_sec(set, || trace_theirs(theirs, set, found)))
             };
+            let alone = |caster: &mut Caster<'_>, found: &mut [f32]| {
+                mrays_per_sec(set, || trace_ours(caster, set, found))
+            };
             // Everybody is first as often as last.
-            let (ours, other) = if round % 2 == 0 {
-                let ours = ours(&mut caster, ours_found);
-                (ours, other(theirs_found))
-            } else {
+            let (ours, other, alone) = if round % 2 == 0 {
+                let ours = ours(&mut caster, &mut ours_found);
                 let other = other(theirs_found);
-                (ours(&mut caster, ours_found), other)
+                (ours, other, alone(&mut caster, alone_found))
+            } else {
+                let alone = alone(&mut caster, alone_found);
+                let other = other(theirs_found);
+                (ours(&mut caster, &mut ours_found), other, alone)
             };
             speeds.ours.push(ours);
             speeds.theirs.extend(other);
+            speeds.alone.push(alone);
         }
+        let ours_found = ours_found.found(set);
+        assert!(ours_found == *alone_found, "rays found something else together");
         let wants_coherent = set.name == "primary-scan" || set.name == "primary-sorted";
         if let Some(theirs) = theirs.filter(|_| wants_coherent) {
             for _ in 0..self.args.rounds {
@@ -143,28 +153,20 @@ impl Bench<'_> {
             }
             trace_theirs(theirs, set, theirs_found);
         }
-        if set.name == "primary-sorted" {
-            let mut together = vec![None; set.rays.len()];
-            for _ in 0..self.args.rounds {
-                let single = mrays_per_sec(set, || trace_ours(&mut caster, set, ours_found));
-                let packets =
-                    mrays_per_sec(set, || trace_together(&mut caster, set, &mut together));
-                speeds.packets_over_single.push(packets / single);
-            }
-            let t = together.iter().map(|hit: &Option<Hit>| hit.map_or(f32::INFINITY, |hit| hit.t));
-            let is_same = t.zip(&*ours_found).all(|(a, &b)| a == b);
-            assert!(is_same, "rays found something else together");
-        }
-        let mismatches = theirs.map(|_| mismatches(ours_found, theirs_found));
+        let mismatches = theirs.map(|_| mismatches(&ours_found, theirs_found));
         self.rows(&format!("rays.{scene}.{}", set.name), set, &speeds, mismatches)
     }
 
     fn rows(&self, name: &str, set: &Set, speeds: &Speeds, mismatches: Option<f64>) -> Vec<Row> {
         let rival = self.embree.map_or(String::new(), |embree| {
-            format!("; Embree {} with its default flags and build quality", embree.version)
+            format!(
+                "; Embree {} with its default flags and build quality, one ray at a time",
+                embree.version
+            )
         });
         let conditions = format!(
-            "{} rays, {}×{}, one thread, thread CPU time, {} alternating rounds{rival}",
+            "{} rays, {}×{}, one thread, thread CPU time, {} alternating rounds; ours {WAVE} at once as in the renderer, \
+             single: one at a time{rival}",
             set.rays.len(),
             self.size().width,
             self.size().height,
@@ -173,9 +175,16 @@ impl Bench<'_> {
         let row = |what: &str, unit, rounds: &[f64]| {
             Row::new(format!("{name}.{what}"), unit, rounds, &conditions)
         };
-        let mut rows = vec![row("mrays_per_sec", "Mrays/s", &speeds.ours)];
-        if !speeds.packets_over_single.is_empty() {
-            rows.push(row("packet_over_single", "ratio", &speeds.packets_over_single));
+        let ratios = |ours: &[f64], others: &[f64]| -> Vec<f64> {
+            ours.iter().zip(others).map(|(ours, other)| ours / other).collect()
+        };
+        let mut rows = vec![
+            row("mrays_per_sec", "Mrays/s", &speeds.ours),
+            row("single_mrays_per_sec", "Mrays/s", &speeds.alone),
+        ];
+        if set.name == "primary-sorted" {
+            let gains = ratios(&speeds.ours, &speeds.alone);
+            rows.push(row("packet_over_single", "ratio", &gains));
         }
         let Some(mismatches) = mismatches else { return rows };
         rows.push(row("embree_mrays_per_sec", "Mrays/s", &speeds.theirs));
@@ -183,9 +192,10 @@ impl Bench<'_> {
             let what = "embree_coherent8_mrays_per_sec";
             rows.push(row(what, "Mrays/s", &speeds.theirs_in_eights));
         }
-        let ratios: Vec<f64> =
-            speeds.ours.iter().zip(&speeds.theirs).map(|(ours, theirs)| ours / theirs).collect();
-        rows.push(row("ratio_to_embree", "ratio", &ratios));
+        let (to_theirs, alone) =
+            (ratios(&speeds.ours, &speeds.theirs), ratios(&speeds.alone, &speeds.theirs));
+        rows.push(row("ratio_to_embree", "ratio", &to_theirs));
+        rows.push(row("single_ratio_to_embree", "ratio", &alone));
         rows.push(row("mismatches", "rays", &[mismatches]));
         rows
     }
@@ -195,9 +205,9 @@ impl Bench<'_> {
 #[derive(Default)]
 struct Speeds {
     ours: Vec<f64>,
+    alone: Vec<f64>,
     theirs: Vec<f64>,
     theirs_in_eights: Vec<f64>,
-    packets_over_single: Vec<f64>,
 }
 
 fn trace_theirs(scene: &EmbreeScene<'_>, set: &Set, found: &mut [f32]) {

@@ -155,9 +155,10 @@ fn bench_rays_names_what_others_rely_on() {
     let sets = ["primary-scan", "primary-random", "primary-clustered", "primary-sorted", "shadow"];
     let others = ["reflection", "diffuse", "instances-1", "instances-100", "instances-10000"];
     for set in sets.iter().chain(&others) {
-        assert!(value(&format!("rays.generated.{set}.mrays_per_sec")) > 0.0, "{set}");
+        let has = |what: &str| value(&format!("rays.generated.{set}.{what}")) > 0.0;
+        assert!(has("mrays_per_sec") && has("single_mrays_per_sec"), "{set}");
         if has_embree {
-            assert!(value(&format!("rays.generated.{set}.ratio_to_embree")) > 0.0, "{set}");
+            assert!(has("ratio_to_embree") && has("single_ratio_to_embree"), "{set}");
         }
     }
 }

@@ -35,6 +35,13 @@ impl Detected {
     }
 }
 
+#[cfg(test)]
+impl Detected {
+    pub(crate) fn without_wider(self) -> Detected {
+        Detected { wider: None }
+    }
+}
+
 /// Something to be compiled for AVX2.
 pub(crate) trait Task {
     type Output;

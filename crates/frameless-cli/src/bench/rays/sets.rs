@@ -4,7 +4,7 @@ use std::f32::consts::TAU;
 
 use frameless::{Request, Rng, Size};
 use frameless_scene::{Geometry, Projection, Scene, State, View, look_at};
-use frameless_trace::{Camera, Caster, Hit, Moment, Ray, World};
+use frameless_trace::{Camera, Caster, Hit, Moment, Ray, WAVE, World};
 use glam::{Vec3, Vec3A};
 
 /// Rays of one kind in one order.
@@ -213,9 +213,42 @@ pub(super) fn trace_ours(caster: &mut Caster<'_>, set: &Set, found: &mut [f32]) 
     }
 }
 
-/// The same as the loop does it: batch by batch, in the order that they are in.
-pub(super) fn trace_together(caster: &mut Caster<'_>, set: &Set, found: &mut [Option<Hit>]) {
-    for (rays, found) in set.rays.chunks(BATCH).zip(found.chunks_mut(BATCH)) {
-        caster.nearest_of(rays, found);
+/// Room for what is found of a set by [`trace_together`].
+pub(super) struct Together {
+    hits: Vec<Option<Hit>>,
+    blocked: Vec<bool>,
+}
+
+impl Together {
+    pub(super) fn of(set: &Set) -> Together {
+        Together { hits: vec![None; set.rays.len()], blocked: vec![false; set.rays.len()] }
+    }
+
+    /// As from [`trace_ours`].
+    pub(super) fn found(&self, set: &Set) -> Vec<f32> {
+        match set.asks {
+            Asks::Nearest => {
+                self.hits.iter().map(|hit| hit.map_or(f32::INFINITY, |hit| hit.t)).collect()
+            }
+            Asks::Blocked => {
+                self.blocked.iter().map(|&blocked| if blocked { 0.0 } else { 1.0 }).collect()
+            }
+        }
+    }
+}
+
+/// The same as the renderer does it: as many at once, in the order that they are in.
+pub(super) fn trace_together(caster: &mut Caster<'_>, set: &Set, found: &mut Together) {
+    match set.asks {
+        Asks::Nearest => {
+            for (rays, hits) in set.rays.chunks(WAVE).zip(found.hits.chunks_mut(WAVE)) {
+                caster.nearest_of(rays, hits);
+            }
+        }
+        Asks::Blocked => {
+            for (rays, blocked) in set.rays.chunks(WAVE).zip(found.blocked.chunks_mut(WAVE)) {
+                caster.is_blocked_of(rays, 1.0, blocked);
+            }
+        }
     }
 }
