@@ -4,7 +4,7 @@ use frameless::{Request, Size, Surface};
 use frameless_scene::View;
 
 use crate::camera::Camera;
-use crate::direct::{NoProbe, Probe};
+use crate::direct::Probe;
 use crate::holes::Chance;
 use crate::kernel::Isa;
 #[cfg(target_arch = "x86_64")]
@@ -229,12 +229,10 @@ impl<R: Iterator<Item = Request>, T: FnMut([f32; 3], Surface)> Samples<'_, R, T>
                     world.radiances(moment, (rays, met, cone), settings, stack, &mut take);
                 }
                 Integrator::Path => {
-                    for ((request, &ray), &met) in asked.iter().zip(rays).zip(&*met) {
-                        let (seen, probe) = ((ray, met, cone), &mut NoProbe);
-                        let (rgb, surface) =
-                            world.path_radiance(moment, seen, request, settings, stack, probe);
+                    let put = |request: &Request, rgb, surface| {
                         take(rgb, in_own_pixel(surface, moment, camera, request, settings));
-                    }
+                    };
+                    world.path_radiances(moment, (rays, met, cone), asked, settings, stack, put);
                 }
             }
         }

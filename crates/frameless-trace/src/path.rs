@@ -20,12 +20,13 @@ use frameless_scene::Material;
 use glam::Vec3A;
 
 use crate::bsdf::Bsdf;
-use crate::direct::{Probe, finite, sky_surface};
+use crate::direct::{NoProbe, Probe, finite, sky_surface};
 #[cfg(doc)]
 use crate::emitters::Emitters;
 use crate::first::FirstSurface;
-use crate::holes::attenuation;
+use crate::holes::{Chance, attenuation};
 use crate::integrator::Settings;
+use crate::many::WAVE;
 use crate::moment::Moment;
 use crate::numbers::Numbers;
 use crate::point::Point;
@@ -44,6 +45,53 @@ const NEARLY_THERE: f32 = 1.0 - 1e-4;
 /// Of a path that has lost nothing: it has to end some time in a closed white room.
 const MOST_LIKELY_ON: f32 = 0.95;
 
+/// A path under way.
+struct Path {
+    numbers: Numbers,
+    /// Where it goes.
+    ray: Ray,
+    cone: Cone,
+    radiance: Vec3A,
+    throughput: Vec3A,
+    first: FirstSurface,
+    /// Of the direction that the path took last; `None` where no other would have done.
+    density: Option<f32>,
+    /// Absorption per metre of what the path is inside, if that is known.
+    inside: Option<Vec3A>,
+    depth: u32,
+    /// Whether the camera's ray passes backs: it has met one already.
+    culls: bool,
+}
+
+impl Path {
+    #[inline(always)]
+    fn new(ray: Ray, cone: Cone, request: &Request, settings: &Settings) -> Path {
+        Path {
+            numbers: Numbers::of(request),
+            ray,
+            cone,
+            radiance: Vec3A::ZERO,
+            throughput: Vec3A::ONE,
+            first: FirstSurface::new(settings.surfaces),
+            density: None,
+            inside: None,
+            depth: 0,
+            culls: false,
+        }
+    }
+
+    /// How what it meets next and blends decides whether it is there.
+    #[inline(always)]
+    fn chance(&self) -> Chance {
+        self.numbers.chance(self.depth)
+    }
+
+    #[inline(always)]
+    fn seen(&self) -> ([f32; 3], Surface) {
+        (finite(self.radiance), self.first.surface(&self.ray))
+    }
+}
+
 impl World {
     /// What comes back along a ray whose direction has unit length, by one random path. `met`: what the ray meets first, by
     /// `first_chance`.
@@ -51,127 +99,185 @@ impl World {
     pub(crate) fn path_radiance(
         &self,
         moment: &Moment,
-        (mut ray, mut met, mut cone): (Ray, Option<Hit>, Cone),
+        (ray, mut met, cone): (Ray, Option<Hit>, Cone),
         request: &Request,
         settings: &Settings,
         stack: &mut Stack,
         probe: &mut impl Probe,
     ) -> ([f32; 3], Surface) {
-        let numbers = Numbers::of(request);
-        let (mut radiance, mut throughput) = (Vec3A::ZERO, Vec3A::ONE);
-        let mut first = FirstSurface::new(settings.surfaces);
-        // Of the direction that the path took last; `None` where no other would have done.
-        let mut density = None;
-        // Absorption per metre of what the path is inside, if that is known.
-        let mut inside = None;
-        let mut depth = 0;
-        // Whether the camera's ray passes backs: it has met one already.
-        let mut culls = false;
-        loop {
-            probe
-                .note(|| format!("ray {depth}: from {:.5} along {:.5}", ray.origin, ray.direction));
-            let Some(hit) = met else {
-                let gives = throughput * self.sky_seen(ray.direction, density);
-                probe.note(|| format!("  nothing hit: adds {gives:.6}"));
-                radiance += gives;
-                first.see(self, || sky_surface(&ray), throughput);
-                break;
+        let mut path = Path::new(ray, cone, request, settings);
+        while self.bounce(moment, &mut path, met, settings, stack, probe) {
+            met = match path.culls {
+                false => self.nearest(moment, &path.ray, || path.chance(), stack),
+                true => self.behind_back(moment, &path.ray, || path.chance(), stack),
             };
-            let mut point = Point::new(self, moment, &ray, &hit, cone);
-            probe.note(|| format!("  {hit:?}"));
-            if depth == 0 && !culls && self.is_culled(&hit, &point) {
-                probe.note(|| "  the back of what is single-sided, which the camera passes".into());
-                culls = true;
-                met = self.behind_back(moment, &ray, || numbers.chance(depth), stack);
-                continue;
-            }
-            if culls {
-                self.lift_onto_back(moment, (&ray, cone), &mut point, stack, probe);
-            }
-            let material = &self.scene().materials[point.material as usize];
-            // Directions have unit length.
-            let way_m = hit.t;
-            inside = inside.or_else(|| point.behind(material));
-            if let Some(sigma) = inside {
-                throughput *= attenuation(sigma, way_m);
-            }
-            if material.unlit {
-                // Shown, but no light for others.
-                if density.is_none() {
-                    let gives = throughput * point.matter.base;
-                    probe.note(|| format!("  unlit: adds {gives:.6}"));
-                    radiance += gives;
-                }
-                first.see(self, || point.unlit(&hit), throughput);
-                break;
-            }
-            probe.note(|| describe(&point, material, throughput));
-            let (matter, to_eye) = (&point.matter, -ray.direction);
-            let mut bsdf = Bsdf::undivided(matter, point.normal, to_eye);
-            bsdf.divide_lobes(matter, point.is_front, to_eye);
-            let emissive = point.matter.emissive;
-            if emissive != Vec3A::ZERO && (point.is_front || material.double_sided) {
-                let place = [hit.instance, hit.primitive];
-                let to_light = hit.t * ray.direction;
-                let other = || self.emitters.density_of(&moment.lamps, place, to_light);
-                let met = density.map_or(1.0, |own| weight(own, other()));
-                let gives = met * throughput * emissive;
-                probe.note(|| format!("  emits {emissive:.5}, weighs {met:.4}: adds {gives:.6}"));
-                radiance += gives;
-            }
-            let is_last = depth == settings.max_depth;
-            let mut scattered = Vec3A::ZERO;
-            let asked = self.ask_lights(moment, &point, settings, stack, probe, |arriving| {
-                scattered += bsdf.scattered(arriving.to_light) * arriving.irradiance;
-            });
-            let [to_follow, to_light] = numbers.at_surface(depth);
-            if !self.emitters.is_empty() {
-                scattered += self.ask_emitters(moment, &point, &bsdf, is_last, to_light, stack);
-            }
-            if let Some(surroundings) = &self.surroundings {
-                let light = surroundings.sample(numbers.sky(depth));
-                scattered += self.ask_surroundings(moment, &point, &bsdf, is_last, light, stack);
-            }
-            let gives = throughput * scattered;
-            probe.note(|| format!("  of lights, lamps and environment: adds {gives:.6}"));
-            radiance += gives;
-            let albedo = bsdf.albedo();
-            let seen = || point.surface(&hit, albedo, asked.unhindered, asked.lit);
-            first.see(self, seen, throughput);
-            // Through a lens what is seen in a mirror is as blurred as if it were where its image is; it goes with the mirror.
-            let wants_images = settings.surfaces && settings.lens.is_none();
-            if depth == 0 && wants_images && bsdf.is_mirror() {
-                first.look_into_mirror(self, moment, &hit, ray.direction);
-            }
-            if is_last {
-                break;
-            }
-            let Some(next) = bsdf.sample(to_follow) else { break };
-            // A shading normal may lead to the wrong side of the surface itself.
-            if (next.direction.dot(point.geometric_normal) <= 0.0) != next.passes {
-                break;
-            }
-            throughput *= next.weight;
-            if depth >= SAFE_DEPTH {
-                let goes_on = throughput.max_element().min(MOST_LIKELY_ON);
-                probe.note(|| format!("  goes on with a probability of {goes_on:.4}"));
-                if numbers.roulette(depth) >= goes_on {
-                    break;
-                }
-                throughput /= goes_on;
-            }
-            density = next.density;
-            cone = cone.after(way_m).scattered(next.alpha);
-            if next.passes {
-                inside = point.beyond(material, inside);
-            }
-            let origin = if next.passes { point.inside() } else { point.outside };
-            ray = Ray { origin, direction: next.direction };
-            depth += 1;
-            culls = false;
-            met = self.nearest(moment, &ray, || numbers.chance(depth), stack);
         }
-        (finite(radiance), first.surface(&ray))
+        path.seen()
+    }
+
+    /// The same of at most [`WAVE`] rays, for `take` in their order: each bounce of all of them, so that many rays are under way at once.
+    #[inline(always)]
+    pub(crate) fn path_radiances(
+        &self,
+        moment: &Moment,
+        (rays, first_met, cone): (&[Ray], &[Option<Hit>], Cone),
+        requests: &[Request],
+        settings: &Settings,
+        stack: &mut Stack,
+        mut take: impl FnMut(&Request, [f32; 3], Surface),
+    ) {
+        let begin = |(&ray, request)| Path::new(ray, cone, request, settings);
+        let mut paths: Vec<Path> = rays.iter().zip(requests).map(begin).collect();
+        let mut met = [None; WAVE];
+        met[..rays.len()].copy_from_slice(first_met);
+        // Those that go on.
+        let mut going: Vec<usize> = (0..paths.len()).collect();
+        let probe = &mut NoProbe;
+        while !going.is_empty() {
+            let mut count = 0;
+            for place in 0..going.len() {
+                let path = going[place];
+                if self.bounce(moment, &mut paths[path], met[place], settings, stack, probe) {
+                    going[count] = path;
+                    count += 1;
+                }
+            }
+            going.truncate(count);
+            let mut rays = [Ray::NONE; WAVE];
+            for (ray, &path) in rays.iter_mut().zip(&going) {
+                *ray = paths[path].ray;
+            }
+            let (rays, met) = (&rays[..going.len()], &mut met[..going.len()]);
+            self.nearest_of(moment, rays, |place| paths[going[place]].chance(), met, stack);
+            for (&path, met) in going.iter().zip(met) {
+                let path = &paths[path];
+                if path.culls {
+                    *met = self.behind_back(moment, &path.ray, || path.chance(), stack);
+                }
+            }
+        }
+        for (path, request) in paths.iter().zip(requests) {
+            let (rgb, surface) = path.seen();
+            take(request, rgb, surface);
+        }
+    }
+
+    /// Adds what comes from where a path has met something, or the sky, and brings it to where it goes on; returns false if it ends.
+    #[inline(always)]
+    fn bounce(
+        &self,
+        moment: &Moment,
+        path: &mut Path,
+        met: Option<Hit>,
+        settings: &Settings,
+        stack: &mut Stack,
+        probe: &mut impl Probe,
+    ) -> bool {
+        probe.note(|| {
+            format!(
+                "ray {}: from {:.5} along {:.5}",
+                path.depth, path.ray.origin, path.ray.direction
+            )
+        });
+        let Some(hit) = met else {
+            let gives = path.throughput * self.sky_seen(path.ray.direction, path.density);
+            probe.note(|| format!("  nothing hit: adds {gives:.6}"));
+            path.radiance += gives;
+            path.first.see(self, || sky_surface(&path.ray), path.throughput);
+            return false;
+        };
+        let mut point = Point::new(self, moment, &path.ray, &hit, path.cone);
+        probe.note(|| format!("  {hit:?}"));
+        if path.depth == 0 && !path.culls && self.is_culled(&hit, &point) {
+            probe.note(|| "  the back of what is single-sided, which the camera passes".into());
+            path.culls = true;
+            return true;
+        }
+        if path.culls {
+            self.lift_onto_back(moment, (&path.ray, path.cone), &mut point, stack, probe);
+        }
+        let material = &self.scene().materials[point.material as usize];
+        // Directions have unit length.
+        let way_m = hit.t;
+        path.inside = path.inside.or_else(|| point.behind(material));
+        if let Some(sigma) = path.inside {
+            path.throughput *= attenuation(sigma, way_m);
+        }
+        if material.unlit {
+            // Shown, but no light for others.
+            if path.density.is_none() {
+                let gives = path.throughput * point.matter.base;
+                probe.note(|| format!("  unlit: adds {gives:.6}"));
+                path.radiance += gives;
+            }
+            path.first.see(self, || point.unlit(&hit), path.throughput);
+            return false;
+        }
+        probe.note(|| describe(&point, material, path.throughput));
+        let (matter, to_eye) = (&point.matter, -path.ray.direction);
+        let mut bsdf = Bsdf::undivided(matter, point.normal, to_eye);
+        bsdf.divide_lobes(matter, point.is_front, to_eye);
+        let emissive = point.matter.emissive;
+        if emissive != Vec3A::ZERO && (point.is_front || material.double_sided) {
+            let place = [hit.instance, hit.primitive];
+            let to_light = hit.t * path.ray.direction;
+            let other = || self.emitters.density_of(&moment.lamps, place, to_light);
+            let met = path.density.map_or(1.0, |own| weight(own, other()));
+            let gives = met * path.throughput * emissive;
+            probe.note(|| format!("  emits {emissive:.5}, weighs {met:.4}: adds {gives:.6}"));
+            path.radiance += gives;
+        }
+        let is_last = path.depth == settings.max_depth;
+        let mut scattered = Vec3A::ZERO;
+        let asked = self.ask_lights(moment, &point, settings, stack, probe, |arriving| {
+            scattered += bsdf.scattered(arriving.to_light) * arriving.irradiance;
+        });
+        let [to_follow, to_light] = path.numbers.at_surface(path.depth);
+        if !self.emitters.is_empty() {
+            scattered += self.ask_emitters(moment, &point, &bsdf, is_last, to_light, stack);
+        }
+        if let Some(surroundings) = &self.surroundings {
+            let light = surroundings.sample(path.numbers.sky(path.depth));
+            scattered += self.ask_surroundings(moment, &point, &bsdf, is_last, light, stack);
+        }
+        let gives = path.throughput * scattered;
+        probe.note(|| format!("  of lights, lamps and environment: adds {gives:.6}"));
+        path.radiance += gives;
+        let albedo = bsdf.albedo();
+        let seen = || point.surface(&hit, albedo, asked.unhindered, asked.lit);
+        path.first.see(self, seen, path.throughput);
+        // Through a lens what is seen in a mirror is as blurred as if it were where its image is; it goes with the mirror.
+        let wants_images = settings.surfaces && settings.lens.is_none();
+        if path.depth == 0 && wants_images && bsdf.is_mirror() {
+            path.first.look_into_mirror(self, moment, &hit, path.ray.direction);
+        }
+        if is_last {
+            return false;
+        }
+        let Some(next) = bsdf.sample(to_follow) else { return false };
+        // A shading normal may lead to the wrong side of the surface itself.
+        if (next.direction.dot(point.geometric_normal) <= 0.0) != next.passes {
+            return false;
+        }
+        path.throughput *= next.weight;
+        if path.depth >= SAFE_DEPTH {
+            let goes_on = path.throughput.max_element().min(MOST_LIKELY_ON);
+            probe.note(|| format!("  goes on with a probability of {goes_on:.4}"));
+            if path.numbers.roulette(path.depth) >= goes_on {
+                return false;
+            }
+            path.throughput /= goes_on;
+        }
+        path.density = next.density;
+        path.cone = path.cone.after(way_m).scattered(next.alpha);
+        if next.passes {
+            path.inside = point.beyond(material, path.inside);
+        }
+        let origin = if next.passes { point.inside() } else { point.outside };
+        path.ray = Ray { origin, direction: next.direction };
+        path.depth += 1;
+        path.culls = false;
+        true
     }
 
     /// What comes from far away, weighed by how else it would have been found than by the path's last direction.
