@@ -7,7 +7,7 @@ use glam::Vec3A;
 
 use crate::direct::Probe;
 use crate::integrator::Settings;
-use crate::many::WAVE;
+use crate::many::SHADED;
 use crate::moment::Moment;
 use crate::point::Point;
 use crate::ray::Ray;
@@ -125,7 +125,7 @@ impl World {
         asked
     }
 
-    /// The sums of [`World::ask_lights`] for at most [`WAVE`] points, where there are any; shadow rays are asked about together.
+    /// The sums of [`World::ask_lights`] for at most [`SHADED`] points, where there are any; shadow rays are asked about together.
     #[inline(always)]
     pub(crate) fn ask_lights_of(
         &self,
@@ -133,20 +133,20 @@ impl World {
         points: &[Option<&Point>],
         settings: &Settings,
         stack: &mut Stack,
-    ) -> [Asked; WAVE] {
-        let mut asked = [Asked::NOBODY; WAVE];
+    ) -> [Asked; SHADED] {
+        let mut asked = [Asked::NOBODY; SHADED];
         for (index, light) in moment.lights.iter().enumerate() {
-            let mut arriving = [None; WAVE];
-            let (mut rays, mut count) = ([Ray::NONE; WAVE], 0);
+            let mut arriving = [None; SHADED];
+            let (mut rays, mut count) = ([Ray::NONE; SHADED], 0);
             for (arriving, point) in arriving.iter_mut().zip(points) {
                 let Some(point) = point else { continue };
                 *arriving = Arriving::at(point, light, settings);
                 if let Some(arriving) = arriving {
-                    rays[count % WAVE] = arriving.shadow_ray(point, light);
+                    rays[count % SHADED] = arriving.shadow_ray(point, light);
                     count += 1;
                 }
             }
-            let rays = &rays[..count.min(WAVE)];
+            let rays = &rays[..count.min(SHADED)];
             let mut passes = self.passing_of(moment, rays, reach(light), stack).into_iter();
             for (asked, arriving) in asked.iter_mut().zip(arriving) {
                 if let Some(arriving) = arriving

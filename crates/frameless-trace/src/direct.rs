@@ -19,7 +19,7 @@ use crate::first::FirstSurface;
 use crate::fresnel::refracted;
 use crate::holes::{Chance, attenuation};
 use crate::integrator::Settings;
-use crate::many::WAVE;
+use crate::many::SHADED;
 use crate::moment::Moment;
 use crate::point::Point;
 use crate::ray::{Hit, Ray};
@@ -115,7 +115,7 @@ impl World {
         (finite(picture.radiance), picture.first.surface(&ray))
     }
 
-    /// The same of at most [`WAVE`] rays, for `take` in their order; what neighbours have in common is done once.
+    /// The same of at most [`SHADED`] rays, for `take` in their order; what neighbours have in common is done once.
     #[inline(always)]
     pub(crate) fn radiances(
         &self,
@@ -125,12 +125,12 @@ impl World {
         stack: &mut Stack,
         mut take: impl FnMut([f32; 3], Surface),
     ) {
-        let (mut points, mut facet) = ([const { None }; WAVE], None);
+        let (mut points, mut facet) = ([const { None }; SHADED], None);
         for ((point, ray), met) in points.iter_mut().zip(rays).zip(met) {
             let of = |hit| Point::on(self, moment, (ray, hit, cone), &mut facet);
             *point = met.as_ref().map(of);
         }
-        let mut lit = [None; WAVE];
+        let mut lit = [None; SHADED];
         for ((lit, point), met) in lit.iter_mut().zip(&points).zip(met) {
             let (Some(point), Some(hit)) = (point, met) else { continue };
             let material = &self.scene().materials[point.material as usize];

@@ -7,7 +7,7 @@ use frameless_scene::{AlphaMode, Geometry, Material, Mesh, Scene};
 use glam::Vec3A;
 
 use crate::fresnel::Dielectric;
-use crate::many::{Occluded, WAVE};
+use crate::many::{Occluded, SHADED};
 use crate::matter::{Matter, coverage};
 use crate::moment::Moment;
 use crate::numbers::{self, mixed};
@@ -131,7 +131,7 @@ impl World {
         self.passing_targets(moment, &moment.targets(self), (ray, t_max), through_glass, stack)
     }
 
-    /// What [`World::passing`] says of each of at most [`WAVE`] rays, through glass.
+    /// What [`World::passing`] says of each of at most [`SHADED`] rays, through glass.
     #[inline(always)]
     pub(crate) fn passing_of(
         &self,
@@ -139,12 +139,12 @@ impl World {
         rays: &[Ray],
         t_max: f32,
         stack: &mut Stack,
-    ) -> [Vec3A; WAVE] {
+    ) -> [Vec3A; SHADED] {
         let all = moment.targets(self);
         let asks = |instance: u32| moment.placed(instance).has_holes;
         let Occluded { blocked, passed, is_all } = all.occluded_of((rays, t_max), asks, stack);
         let rest = Targets { standing: None, ..all };
-        let mut passes = [Vec3A::ZERO; WAVE];
+        let mut passes = [Vec3A::ZERO; SHADED];
         for (index, (ray, passes)) in rays.iter().zip(&mut passes).enumerate() {
             let has = |rays: u64| rays >> index & 1 != 0;
             if has(blocked) {

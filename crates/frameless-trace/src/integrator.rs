@@ -10,7 +10,7 @@ use crate::kernel::Isa;
 #[cfg(target_arch = "x86_64")]
 use crate::kernel::avx2;
 use crate::lens::{self, Lens};
-use crate::many::WAVE;
+use crate::many::{SHADED, WAVE};
 use crate::moment::Moment;
 use crate::numbers::Numbers;
 use crate::order::by_tile;
@@ -226,7 +226,9 @@ impl<R: Iterator<Item = Request>, T: FnMut([f32; 3], Surface)> Samples<'_, R, T>
             world.nearest_of(moment, rays, chance, met, stack);
             match settings.integrator {
                 Integrator::Direct => {
-                    world.radiances(moment, (rays, met, cone), settings, stack, &mut take);
+                    for (rays, met) in rays.chunks(SHADED).zip(met.chunks(SHADED)) {
+                        world.radiances(moment, (rays, met, cone), settings, stack, &mut take);
+                    }
                 }
                 Integrator::Path => {
                     let put = |request: &Request, rgb, surface| {

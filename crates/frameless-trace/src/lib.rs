@@ -79,7 +79,7 @@ pub use cpu::{CpuTracer, Viewpoint, thread_pool};
 pub use explain::explain;
 pub use integrator::{Integrator, Settings};
 pub use lens::Lens;
-pub use many::WAVE;
+pub use many::{SHADED, WAVE};
 pub use moment::Moment;
 pub use ray::{Hit, Ray};
 pub use render::{Still, render, render_still};

@@ -11,15 +11,16 @@ use crate::kernel::turns::Turns;
 use crate::kernel::{Isa, Kernel, Portable};
 use crate::packet::{Any, Finds, Nearest, Packet, TOGETHER};
 use crate::ray::{Hit, Ray};
-use crate::sift::NoSieve;
 use crate::standing::Standing;
 use crate::stream::Ways;
 use crate::top::Targets;
 use crate::traverse::Stack;
 
-/// Samples that are traced at once: first all their rays, then those from what they hit to a light, a bit each. Fewer: ways are empty while the
-/// last rays end.
+/// Rays from the camera that are traced at once, and rays of a bounce: a bit each. Fewer: ways are empty while the last rays end.
 pub const WAVE: usize = u64::BITS as usize;
+/// Of these so many are shaded at once, and their rays to a light traced, so that the points stay in the nearest cache and little is made ready
+/// for waves that are not full. All 64: pictures of spheres take 3 % longer, waves of 16 a third longer.
+pub const SHADED: usize = 16;
 
 /// Fewer rays than that are asked about one by one: to walk by turns takes memory that has to be made.
 const FEWEST: usize = 4;
@@ -44,6 +45,7 @@ impl Targets<'_> {
             return;
         };
         found.fill(None);
+        let rest = Targets { standing: None, ..*self };
         let mut alone = std::mem::take(&mut stack.alone);
         alone.clear();
         for first in (0..rays.len()).step_by(TOGETHER) {
@@ -52,20 +54,16 @@ impl Targets<'_> {
             let finds = &mut Nearest(found);
             match self.together(tree, (rays, f32::MAX), finds, 0, stack) {
                 None => alone.extend(group.map(|index| index as u32)),
-                Some(meets_more) if meets_more => {
-                    for (ray, found) in rays.iter().zip(found) {
-                        self.also_by_rest(ray, found, stack);
-                    }
-                }
-                Some(_) => (),
+                Some(true) => rest.also_closest(rays, found, stack),
+                Some(false) => (),
             }
         }
         let each = (rays, &*alone, f32::MAX);
         self.by_turns::<_, false>(tree, each, &mut Nearest(found), &mut stack.ways);
         if !self.top.is_empty() {
             for &index in &alone {
-                let index = index as usize;
-                self.also_by_rest(&rays[index], &mut found[index], stack);
+                let one = index as usize..index as usize + 1;
+                rest.also_closest(&rays[one.clone()], &mut found[one], stack);
             }
         }
         stack.alone = alone;
@@ -89,8 +87,8 @@ impl Targets<'_> {
             any.first = first;
             match self.together(tree, (&rays[group.clone()], until), &mut any, 1, stack) {
                 None => alone.extend(group.map(|index| index as u32)),
-                Some(meets_more) if meets_more => (),
-                Some(_) => group.for_each(|index| known.is_all |= 1 << index),
+                Some(true) => (),
+                Some(false) => group.for_each(|index| known.is_all |= 1 << index),
             }
         }
         any.first = 0;
@@ -102,12 +100,6 @@ impl Targets<'_> {
             known.is_all = u64::MAX;
         }
         known
-    }
-
-    /// The nearer of what a ray has hit and what it hits of what does not stand.
-    fn also_by_rest(&self, ray: &Ray, found: &mut Option<Hit>, stack: &mut Stack) {
-        let rest = Targets { standing: None, ..*self };
-        *found = rest.find::<false, _>(ray, found.unwrap_or(Hit::NONE), NoSieve, stack);
     }
 
     /// At most [`TOGETHER`] rays through what stands. `None` if they are better walked by turns; else whether any of them may meet what does
@@ -136,6 +128,9 @@ impl Targets<'_> {
         finds: &mut F,
         ways: &mut Ways,
     ) {
+        if rays.1.is_empty() {
+            return;
+        }
         match self.isa {
             Isa::Portable => tree.walk_by_turns::<Portable, ANY>(rays, finds, ways),
             #[cfg(target_arch = "x86_64")]

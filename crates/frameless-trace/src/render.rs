@@ -40,8 +40,9 @@ pub fn render(
     render_still(world, &still, pool, || ())
 }
 
-/// Side of the squares of pixels that are traced one after the other, so that neighbours are walked together.
-const BLOCK: u32 = 4;
+/// Side of the squares of pixels that are traced one after the other, so that neighbours are walked together: at one sample per pixel as many
+/// as are traced at once, [`crate::WAVE`].
+const BLOCK: u32 = 8;
 
 /// The mean of every pixel's samples. Row-major linear RGB. `row_done` is told of every finished row, by any thread.
 pub fn render_still(
@@ -87,7 +88,8 @@ pub fn render_still(
 
 /// Columns and rows of a block's pixels, along a Morton curve, as far as they are there.
 fn block(left: u32, width: u32, height: u32) -> impl Iterator<Item = (u32, u32)> + Clone {
-    let places = (0..BLOCK * BLOCK).map(|k| (k & 1 | k >> 1 & 2, k >> 1 & 1 | k >> 2 & 2));
+    let even = |k: u32| k & 1 | k >> 1 & 2 | k >> 2 & 4;
+    let places = (0..BLOCK * BLOCK).map(move |k| (even(k), even(k >> 1)));
     let is_there = move |&(x, y): &(u32, u32)| x < width && y < height;
     places.filter(is_there).map(move |(x, y)| (left + x, y))
 }

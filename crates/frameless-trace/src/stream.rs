@@ -118,8 +118,8 @@ pub(crate) fn walk_by_turns<T: Turns, const ANY: bool>(
     let places = [nodes.as_ptr().cast(), leaves.as_ptr().cast()];
     let mut next = indices.iter();
     let mut inner = Few::none();
-    let mut outer = Few::all();
-    for way in ways.iter_mut() {
+    let mut outer = Few::first(indices.len());
+    for way in ways.iter_mut().take(outer.count) {
         way.current = Node::UNUSED;
     }
     loop {
@@ -170,8 +170,9 @@ impl Few {
         Few { numbers: [0; WAYS], count: 0 }
     }
 
-    fn all() -> Few {
-        Few { numbers: std::array::from_fn(|number| number as u8), count: WAYS }
+    /// So many, or all.
+    fn first(count: usize) -> Few {
+        Few { numbers: std::array::from_fn(|number| number as u8), count: count.min(WAYS) }
     }
 
     /// Forgets them, but for [`Few::at`] until as many are added; how many there were.

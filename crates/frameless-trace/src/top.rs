@@ -224,6 +224,16 @@ impl Targets<'_> {
         self.find::<false, _>(ray, Hit::NONE, NoSieve, stack)
     }
 
+    /// Brings each to the nearer of what it is and what its ray hits.
+    pub(crate) fn also_closest(&self, rays: &[Ray], found: &mut [Option<Hit>], stack: &mut Stack) {
+        let also = Also { targets: self, rays, found, stack };
+        match self.isa {
+            Isa::Portable => also.with::<Portable>(),
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx2(proof) => avx2::with(proof, also),
+        }
+    }
+
     /// Whether anything is hit at 0 < t < t_max.
     #[inline]
     pub(crate) fn occluded(&self, ray: &Ray, t_max: f32, stack: &mut Stack) -> bool {
@@ -245,6 +255,34 @@ impl Targets<'_> {
             #[cfg(target_arch = "x86_64")]
             Isa::Avx2(proof) => avx2::with(proof, walk),
         }
+    }
+}
+
+/// The ways of several rays that may have hit something elsewhere.
+struct Also<'a> {
+    targets: &'a Targets<'a>,
+    rays: &'a [Ray],
+    found: &'a mut [Option<Hit>],
+    stack: &'a mut Stack,
+}
+
+impl Also<'_> {
+    #[inline(always)]
+    fn with<K: Kernel>(self) {
+        let Also { targets, rays, found, stack } = self;
+        for (ray, found) in rays.iter().zip(found) {
+            let none = found.unwrap_or(Hit::NONE);
+            *found = Walk::<_, false> { targets, ray, none, sieve: NoSieve, stack }.with::<K>();
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl avx2::Task for Also<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self) {
+        self.with::<avx2::Avx2>();
     }
 }
 

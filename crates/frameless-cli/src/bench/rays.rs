@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use frameless::Size;
 use frameless_scene::{Geometry, Limits, Scene, State};
-use frameless_trace::{Caster, WAVE, World};
+use frameless_trace::{Caster, SHADED, WAVE, World};
 
 use self::embree::{Embree, EmbreeScene, HOW_TO_GET, Triangles};
 use self::sets::{Asks, Set, Together, trace_ours, trace_together};
@@ -26,7 +26,7 @@ const INSTANCES: [u32; 3] = [1, 100, 10_000];
 /// t may differ by this part of itself: two ways to compute the same intersection of a ray that grazes.
 const TOLERANCE: f32 = 1e-3;
 
-/// Rows `rays.<scene>.<set>.…`: `mrays_per_sec`, of ours as the renderer traces them, [`WAVE`] at once, and `single_mrays_per_sec`, one by one;
+/// Rows `rays.<scene>.<set>.…`: `mrays_per_sec`, of ours as the renderer traces them, [`WAVE`] or [`SHADED`] at once, and `single_mrays_per_sec`, one by one;
 /// with Embree `embree_mrays_per_sec`, one by one, `ratio_to_embree` and `single_ratio_to_embree`, round by round, and `mismatches`, rays with
 /// another answer; and `packet_over_single`, ours at once against ours one by one.
 pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
@@ -165,8 +165,8 @@ impl Bench<'_> {
             )
         });
         let conditions = format!(
-            "{} rays, {}×{}, one thread, thread CPU time, {} alternating rounds; ours {WAVE} at once as in the renderer, \
-             single: one at a time{rival}",
+            "{} rays, {}×{}, one thread, thread CPU time, {} alternating rounds; ours {WAVE} at once as in the renderer, rays to lights \
+             {SHADED}; single: one at a time{rival}",
             set.rays.len(),
             self.size().width,
             self.size().height,

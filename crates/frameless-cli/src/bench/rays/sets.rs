@@ -4,7 +4,7 @@ use std::f32::consts::TAU;
 
 use frameless::{Request, Rng, Size};
 use frameless_scene::{Geometry, Projection, Scene, State, View, look_at};
-use frameless_trace::{Camera, Caster, Hit, Moment, Ray, WAVE, World};
+use frameless_trace::{Camera, Caster, Hit, Moment, Ray, SHADED, WAVE, World};
 use glam::{Vec3, Vec3A};
 
 /// Rays of one kind in one order.
@@ -246,7 +246,7 @@ pub(super) fn trace_together(caster: &mut Caster<'_>, set: &Set, found: &mut Tog
             }
         }
         Asks::Blocked => {
-            for (rays, blocked) in set.rays.chunks(WAVE).zip(found.blocked.chunks_mut(WAVE)) {
+            for (rays, blocked) in set.rays.chunks(SHADED).zip(found.blocked.chunks_mut(SHADED)) {
                 caster.is_blocked_of(rays, 1.0, blocked);
             }
         }
