@@ -1,6 +1,6 @@
 //! Many rays, each walked on its own way, by turns: a step of one, then a step of the next.
 //!
-//! A ray alone waits: for memory, for the end of a chain of some forty instructions at every node, and for the right guess of which children
+//! A ray alone waits: for memory, for the end of a chain of instructions at every node, and for the right guess of which children
 //! it meets. None of that depends on the other rays, so that a processor which looks some hundred instructions ahead works on several of
 //! them at once. Rays do not have to have anything in common, unlike those of a [`crate::packet`]; each meets the same nodes as alone, or
 //! nearly so, and finds the same, bit for bit: triangles are tested by the same operations, and which of several hits is best, or whether

@@ -1,10 +1,11 @@
-//! The two inner tests with AVX2 intrinsics. The one place of this crate with `unsafe` code.
+//! The two inner tests, and the steps of rays by turns, with AVX2 intrinsics.
 //!
 //! SAFETY, once for all: every intrinsic needs the processor to have AVX2. The methods of [`Avx2`] are reached only from
 //! [`with`], whose caller holds a [`Detected`], and only [`Detected::new`] makes one, after asking the processor. Loads read
 //! whole rows of [`Node`] (8 bytes; and its children, 4 bytes each, aligned to 32) and, of the [`LONGEST`] words of a [`Leaf`], the first and
 //! the 32 bits from byte 2 on, and eight numbers from x, y and z of its first vertex on: at most from word 6 + 2 · 8 on, by how its methods
-//! mask what they read. Eight [`Entry`] are eight numbers of 64 bits.
+//! mask what they read; of a node also two rows at once, of a [`BoxRay`], which is aligned to 64, four numbers and sixteen bytes. Eight
+//! [`Entry`] are eight numbers of 64 bits. Stores for rays by turns write arrays of eight.
 //! The methods are `inline(always)` so that they end up inside [`with`], where these instructions may be emitted.
 #![allow(unsafe_code)]
 
