@@ -12,7 +12,7 @@ use crate::leaf::{self, Corner, LONGEST, MOST_TRIANGLES, MOST_VERTICES};
 use crate::pages::prefer_large_pages;
 use crate::parts;
 use crate::sah;
-use crate::wide::{Bounds, Child, Node};
+use crate::wide::{Child, Node};
 
 /// A mesh's bottom-level BVH with its triangles.
 #[derive(Clone, Debug)]
@@ -62,7 +62,7 @@ impl Blas {
         leaves.shrink_to_fit();
         prefer_large_pages(&nodes);
         prefer_large_pages(&leaves);
-        let bounds = roots.first().map(|root| root.bounds.into());
+        let bounds = roots.first().map(|root| root.bounds.map(Vec3A::from).into());
         Blas { nodes, leaves, bounds }
     }
 }
@@ -99,10 +99,21 @@ pub(crate) struct Tree {
 /// Where a tree begins.
 #[derive(Clone, Copy)]
 pub(crate) struct Root {
-    pub(crate) bounds: Bounds,
+    pub(crate) bounds: TightBox,
     pub(crate) child: Child,
     /// Entries that a traversal's stack needs.
-    pub(crate) stack_need: usize,
+    pub(crate) stack_need: u32,
+}
+
+/// A box by its corners, which alignment would make a third larger.
+pub(crate) type TightBox = [Vec3; 2];
+
+impl Root {
+    /// Of what is below a node of the binary tree.
+    pub(crate) fn new(binary: &Bvh2, node: u32, child: Child, stack_need: usize) -> Root {
+        let bounds = bounds(binary, node).map(Vec3::from);
+        Root { bounds, child, stack_need: stack_need as u32 }
+    }
 }
 
 /// Of a part's nodes those that are placed again.
@@ -136,19 +147,19 @@ pub(crate) fn build(
         };
         tree.roots = if roots == 1 {
             let stack_need = collapse.make_root(binary, nodes, make_leaf);
-            vec![Root { bounds: bounds(binary, 0), child: Child::ROOT, stack_need }]
+            vec![Root::new(binary, 0, Child::ROOT, stack_need)]
         } else {
             let roots = collapse.cut(binary, roots).into_iter().map(|root| {
                 let (child, stack_need) = collapse.make(binary, root, nodes, &mut make_leaf);
-                Root { bounds: bounds(binary, root), child, stack_need }
+                Root::new(binary, root, child, stack_need)
             });
             roots.collect()
         };
         tree
     };
-    let binary = binary_tree(boxes, REINSERTED);
+    let binary = binary_tree(members.len() as u32, move |m| boxes[m as usize], REINSERTED);
     let tree = make(&binary);
-    let is_deep = tree.roots.iter().any(|root| root.stack_need > most_stack);
+    let is_deep = tree.roots.iter().any(|root| root.stack_need as usize > most_stack);
     if is_deep { make(&halve(&boxes_of(&binary))) } else { tree }
 }
 
@@ -163,8 +174,8 @@ fn fits(corners: impl Fn(u32) -> [Corner; 3], triangles: &[u32]) -> bool {
 
 /// Divided from above; then the largest of the boxes, as many of a hundred, find better places. A box per leaf, which is the only one left of
 /// it: see [`boxes_of`].
-pub(crate) fn binary_tree(boxes: Vec<Aabb>, reinserted: f32) -> Bvh2 {
-    let mut binary = sah::divide(&boxes);
+pub(crate) fn binary_tree(count: u32, boxes: impl Fn(u32) -> Aabb, reinserted: f32) -> Bvh2 {
+    let mut binary = sah::divide(count, &boxes);
     drop(boxes);
     ReinsertionOptimizer::default().run(&mut binary, reinserted, None);
     binary
@@ -245,7 +256,7 @@ mod tests {
     #[test]
     fn halving_never_needs_more_stack_than_there_is() {
         let boxes = shrinking(390);
-        let binary = binary_tree(boxes.clone(), REINSERTED);
+        let binary = binary_tree(boxes.len() as u32, |k| boxes[k as usize], REINSERTED);
         let deep = stack_need(&binary);
         assert!(deep > STACK_PER_TREE, "{deep}: the fallback would never be taken");
         let kept = boxes_of(&binary);

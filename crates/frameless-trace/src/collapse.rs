@@ -19,12 +19,35 @@ use crate::wide::{Bounds, Child, NOTHING, Node};
 /// Children of a wide node.
 const WIDTH: usize = 8;
 
-/// What is known of a binary node.
+/// What becomes of a binary node. The costs that say so are wanted by its parent only, and there is no room for those of all.
+///
+/// Three bits per number of children i from 2 to 8, lowest first: the cheapest k of D(n, i), or 0 where C(n, i − 1) costs no more. Bit 31: it is
+/// a leaf.
+#[derive(Clone, Copy, Default)]
+struct Plan(u32);
+
+impl Plan {
+    const LEAF: Plan = Plan(1 << 31);
+
+    fn is_leaf(self) -> bool {
+        self.0 & Plan::LEAF.0 != 0
+    }
+
+    /// How many of so many children are the left one's.
+    fn left_of(self, children: usize) -> usize {
+        (self.0 >> (3 * (children - 2)) & 7) as usize
+    }
+
+    fn set_left_of(&mut self, children: usize, left: usize) {
+        self.0 |= (left as u32) << (3 * (children - 2));
+    }
+}
+
+/// What a binary node costs.
 #[derive(Clone, Copy)]
-struct Plan {
+struct Cost {
     /// C(n, 1) to C(n, 7).
     least: [f32; WIDTH - 1],
-    is_leaf: bool,
     /// Boxes below; one more than a leaf may have stands for all larger numbers.
     count: u8,
 }
@@ -34,9 +57,11 @@ const MANY: u8 = MOST_TRIANGLES as u8 + 1;
 /// Plans what the wide tree is and makes it, in memory that is used again.
 #[derive(Default)]
 pub(crate) struct Collapse {
-    /// The binary nodes, parents before their children.
-    order: Vec<u32>,
     plans: Vec<Plan>,
+    /// Of nodes whose parent is still to be planned.
+    costs: Vec<Cost>,
+    /// Nodes that are still to be planned, and whether what is below them is.
+    unplanned: Vec<(u32, bool)>,
     /// What is still to be made: a binary node, the wide node it becomes, entries on the stack when a traversal comes here.
     work: Vec<(u32, u32, usize)>,
 }
@@ -67,55 +92,35 @@ impl Collapse {
     /// # Panics
     /// If there is no tree, or a leaf of the binary tree has not just one box.
     pub(crate) fn plan(&mut self, binary: &Bvh2, leaf_cost: f32, fits: impl Fn(&[u32]) -> bool) {
-        self.order_nodes(binary);
         self.plans.clear();
-        self.plans
-            .resize(binary.nodes.len(), Plan { least: [0.0; WIDTH - 1], is_leaf: false, count: 0 });
-        for &node in self.order.iter().rev() {
+        self.plans.resize(binary.nodes.len(), Plan::default());
+        // Children before their parent, the left one first: what they cost lies on top then.
+        let Collapse { plans, costs, unplanned, .. } = self;
+        unplanned.push((0, false));
+        while let Some((node, knows_children)) = unplanned.pop() {
             let source = &binary.nodes[node as usize];
-            let area = source.aabb().half_area();
-            let as_leaf = leaf_cost * area;
+            let as_leaf = leaf_cost * source.aabb().half_area();
             if source.is_leaf() {
                 assert_eq!(source.prim_count, 1, "boxes of a binary leaf");
-                self.plans[node as usize] =
-                    Plan { least: [as_leaf; WIDTH - 1], is_leaf: true, count: 1 };
-                continue;
+                plans[node as usize] = Plan::LEAF;
+                costs.push(Cost { least: [as_leaf; WIDTH - 1], count: 1 });
+            } else if knows_children {
+                let (right, left) = (costs.pop(), costs.pop());
+                let below = left.zip(right).expect("the costs of both children");
+                let can_be_leaf = || {
+                    let boxes = boxes_below(binary, node);
+                    fits(&boxes.indices[..boxes.count])
+                };
+                let area = source.aabb().half_area();
+                let (plan, cost) = weigh(below, area, as_leaf, can_be_leaf);
+                plans[node as usize] = plan;
+                costs.push(cost);
+            } else {
+                let left = source.first_index;
+                unplanned.extend([(node, true), (left + 1, false), (left, false)]);
             }
-            let [left, right] = [0, 1].map(|side| self.plans[source.first_index as usize + side]);
-            let count = (left.count + right.count).min(MANY);
-            let divided = |children: usize| {
-                let ways = (1..children)
-                    .filter(|&k| k < WIDTH && children - k < WIDTH)
-                    .map(|k| left.least[k - 1] + right.least[children - k - 1]);
-                ways.fold(f32::INFINITY, f32::min)
-            };
-            let mut plan =
-                Plan { least: [area + divided(WIDTH); WIDTH - 1], is_leaf: false, count };
-            if count < MANY && as_leaf <= plan.least[0] {
-                let boxes = boxes_below(binary, node);
-                if fits(&boxes.indices[..boxes.count]) {
-                    plan.is_leaf = true;
-                    plan.least[0] = as_leaf;
-                }
-            }
-            for children in 2..WIDTH {
-                plan.least[children - 1] = plan.least[children - 2].min(divided(children));
-            }
-            self.plans[node as usize] = plan;
         }
-    }
-
-    fn order_nodes(&mut self, binary: &Bvh2) {
-        self.order.clear();
-        self.order.push(0);
-        let mut next = 0;
-        while next < self.order.len() {
-            let node = &binary.nodes[self.order[next] as usize];
-            if !node.is_leaf() {
-                self.order.extend([node.first_index, node.first_index + 1]);
-            }
-            next += 1;
-        }
+        costs.clear();
     }
 
     /// The roots of the trees that are left when the largest nodes are taken away until there are `count`, or leaves alone.
@@ -123,7 +128,7 @@ impl Collapse {
         let mut roots = vec![0];
         let area = |node: u32| binary.nodes[node as usize].aabb().half_area();
         while roots.len() < count {
-            let inner = (0..roots.len()).filter(|&k| !self.plans[roots[k] as usize].is_leaf);
+            let inner = (0..roots.len()).filter(|&k| !self.plans[roots[k] as usize].is_leaf());
             let largest = inner.max_by(|&a, &b| area(roots[a]).total_cmp(&area(roots[b])));
             let Some(largest) = largest else { break };
             let root = roots.swap_remove(largest);
@@ -145,7 +150,7 @@ impl Collapse {
             let boxes = boxes_below(binary, node);
             leaf(&boxes.indices[..boxes.count])
         };
-        if self.plans[root as usize].is_leaf {
+        if self.plans[root as usize].is_leaf() {
             return (make_leaf(root), 0);
         }
         let (first, mut stack_need) = (nodes.len(), 0);
@@ -158,7 +163,7 @@ impl Collapse {
             stack_need = stack_need.max(waiting);
             let mut children = [(NOTHING, Node::UNUSED); WIDTH];
             for (place, &member) in children.iter_mut().zip(members.as_slice()) {
-                let child = if self.plans[member as usize].is_leaf {
+                let child = if self.plans[member as usize].is_leaf() {
                     make_leaf(member)
                 } else {
                     nodes.push(Node::EMPTY);
@@ -180,7 +185,7 @@ impl Collapse {
         nodes: &mut Vec<Node>,
         mut leaf: impl FnMut(&[u32]) -> Child,
     ) -> usize {
-        if self.plans[0].is_leaf {
+        if self.plans[0].is_leaf() {
             let boxes = boxes_below(binary, 0);
             let child = leaf(&boxes.indices[..boxes.count]);
             nodes.push(Node::new(&[(bounds(binary, 0), child)]));
@@ -199,9 +204,9 @@ impl Collapse {
         while waiting > 0 {
             waiting -= 1;
             let (node, mut children) = work[waiting];
+            let plan = self.plans[node as usize];
             if children < WIDTH {
-                let least = &self.plans[node as usize].least;
-                while children > 1 && least[children - 2] <= least[children - 1] {
+                while children > 1 && plan.left_of(children) == 0 {
                     children -= 1;
                 }
                 if children == 1 {
@@ -211,16 +216,44 @@ impl Collapse {
                 }
             }
             let left = binary.nodes[node as usize].first_index;
-            let [a, b] = [left, left + 1].map(|side| &self.plans[side as usize].least);
-            let ways = (1..children).filter(|&k| k < WIDTH && children - k < WIDTH);
-            let cost = |&k: &usize| a[k - 1] + b[children - k - 1];
-            let k = ways.min_by(|x, y| cost(x).total_cmp(&cost(y))).expect("two children at least");
+            let k = plan.left_of(children);
             work[waiting] = (left + 1, children - k);
             work[waiting + 1] = (left, k);
             waiting += 2;
         }
         members
     }
+}
+
+/// What becomes of an inner node whose children cost that, and what it costs.
+fn weigh(
+    (left, right): (Cost, Cost),
+    area: f32,
+    as_leaf: f32,
+    can_be_leaf: impl Fn() -> bool,
+) -> (Plan, Cost) {
+    // D(n, i), and its k.
+    let divided = |children: usize| {
+        let ways = (1..children).filter(|&k| k < WIDTH && children - k < WIDTH);
+        let ways = ways.map(|k| (left.least[k - 1] + right.least[children - k - 1], k));
+        ways.min_by(|a, b| a.0.total_cmp(&b.0)).expect("two children at least")
+    };
+    let (mut plan, count) = (Plan::default(), (left.count + right.count).min(MANY));
+    let (whole, k) = divided(WIDTH);
+    plan.set_left_of(WIDTH, k);
+    let mut least = [area + whole; WIDTH - 1];
+    if count < MANY && as_leaf <= least[0] && can_be_leaf() {
+        plan.0 |= Plan::LEAF.0;
+        least[0] = as_leaf;
+    }
+    for children in 2..WIDTH {
+        let (cost, k) = divided(children);
+        least[children - 1] = least[children - 2].min(cost);
+        if least[children - 2] > least[children - 1] {
+            plan.set_left_of(children, k);
+        }
+    }
+    (plan, Cost { least, count })
 }
 
 pub(crate) fn bounds(binary: &Bvh2, node: u32) -> Bounds {
@@ -263,8 +296,12 @@ mod tests {
         (0..count).map(|k| Aabb::new(corner(k), corner(k) + Vec3A::ONE)).collect()
     }
 
+    fn divided(boxes: &[Aabb]) -> Bvh2 {
+        divide(boxes.len() as u32, &|k| boxes[k as usize])
+    }
+
     fn collapsed(count: usize, leaf_cost: f32) -> (Vec<Node>, Vec<Vec<u32>>) {
-        let binary = divide(&row(count));
+        let binary = divided(&row(count));
         let (mut collapse, mut nodes, mut leaves) = (Collapse::default(), Vec::new(), Vec::new());
         collapse.plan(&binary, leaf_cost, |_| true);
         collapse.make_root(&binary, &mut nodes, |boxes| {
@@ -300,7 +337,7 @@ mod tests {
 
     #[test]
     fn boxes_that_do_not_fit_together_are_in_leaves_of_their_own() {
-        let binary = divide(&row(20));
+        let binary = divided(&row(20));
         let (mut collapse, mut nodes, mut leaves) = (Collapse::default(), Vec::new(), 0);
         collapse.plan(&binary, 1.0, |boxes| boxes.len() == 2);
         collapse.make_root(&binary, &mut nodes, |boxes| {
@@ -313,7 +350,7 @@ mod tests {
 
     #[test]
     fn a_cut_leaves_trees_over_everything() {
-        let binary = divide(&row(500));
+        let binary = divided(&row(500));
         let mut collapse = Collapse::default();
         collapse.plan(&binary, 1.0, |_| true);
         let roots = collapse.cut(&binary, 20);

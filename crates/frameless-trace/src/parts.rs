@@ -13,12 +13,12 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
 
-use crate::build::{self, Root, Tree, Triangles, binary_tree, boxes_of, halve, sane_box};
-use crate::collapse::{Collapse, bounds};
+use crate::build::{self, Root, TightBox, Tree, Triangles, binary_tree, boxes_of, halve, sane_box};
+use crate::collapse::Collapse;
 use crate::leaf::LONGEST;
 use crate::sah::split;
 use crate::traverse::STACK_PER_TREE;
-use crate::wide::Child;
+use crate::wide::{Child, Node};
 
 /// Triangles of a part at most. Fewer: boxes find better places among fewer; more: memory, and cores with nothing to do.
 const PART: usize = 1 << 13;
@@ -33,11 +33,8 @@ const REINSERTED: f32 = 1.0;
 /// Of the stack's entries those that a part may need. Halving 2¹³ triangles needs 7 · 13 at most.
 const STACK_PER_PART: usize = 96;
 
-/// The box around a triangle, which alignment would make a third larger.
-type Box = [Vec3; 2];
-
 /// Of a triangle that no tree may hold.
-const NOWHERE: Box = [Vec3::INFINITY; 2];
+const NOWHERE: TightBox = [Vec3::INFINITY; 2];
 
 /// Builds a tree: no node and no root if there are no triangles that can be hit, else one root.
 pub(crate) fn build(triangles: &impl Triangles) -> Tree {
@@ -50,24 +47,27 @@ pub(crate) fn build(triangles: &impl Triangles) -> Tree {
     if order.len() <= PART {
         return build::build(triangles, &order, 1, STACK_PER_TREE);
     }
-    let parts = divide(&boxes, &mut order);
+    let mut parts = divide(&boxes, &mut order);
     // They are made again part by part: there is no room for all of them beside the tree.
     drop(boxes);
     let mut all = Tree::with_room_for(order.len());
-    for some in parts.chunks(2 * rayon::current_num_threads()) {
+    // The last ones first: as the tree grows, what is left of the order shrinks.
+    while !parts.is_empty() {
+        let some = parts.split_off(parts.len().saturating_sub(2 * rayon::current_num_threads()));
         let build = |part: &Range<usize>| {
             let roots = (part.len() / PER_ROOT).max(2);
             build::build(triangles, &order[part.clone()], roots, STACK_PER_PART)
         };
         let built: Vec<Tree> = some.par_iter().map(build).collect();
         built.into_iter().for_each(|part| all.append(part));
+        order.truncate(some[0].start);
+        order.shrink_to_fit();
     }
-    drop((parts, order));
     all.join();
     all
 }
 
-fn boxes(triangles: &impl Triangles) -> Vec<Box> {
+fn boxes(triangles: &impl Triangles) -> Vec<TightBox> {
     let all = (0..triangles.count()).into_par_iter();
     all.map(|triangle| sane_box(&triangles.corners(triangle)).unwrap_or(NOWHERE)).collect()
 }
@@ -99,12 +99,10 @@ impl Tree {
     fn join(&mut self) {
         // Memory is never as scarce as here: what is not wanted any more goes at once.
         let roots = std::mem::take(&mut self.roots);
-        let most_below = roots.iter().map(|root| root.stack_need).max().unwrap_or(0);
+        let most_below = roots.iter().map(|root| root.stack_need).max().unwrap_or(0) as usize;
         let children: Vec<Child> = roots.iter().map(|root| root.child).collect();
-        let boxes: Vec<Aabb> =
-            roots.iter().map(|root| Aabb::new(root.bounds[0], root.bounds[1])).collect();
-        drop(roots);
-        let mut binary = binary_tree(boxes, REINSERTED);
+        let around = move |k: u32| aabb(&roots[k as usize].bounds);
+        let mut binary = binary_tree(children.len() as u32, around, REINSERTED);
         let mut collapse = Collapse::default();
         collapse.plan(&binary, 1.0, |_| false);
         let make = |collapse: &mut Collapse, binary: &Bvh2, moved_by: usize| {
@@ -115,34 +113,33 @@ impl Tree {
             (nodes, stack_need + most_below)
         };
         // How many nodes there are is known only once there are all.
-        let (mut front, mut stack_need) = make(&mut collapse, &binary, 0);
+        let size = |(nodes, stack_need): (Vec<Node>, usize)| (nodes.len(), stack_need);
+        let (mut front, mut stack_need) = size(make(&mut collapse, &binary, 0));
         if stack_need > STACK_PER_TREE {
             binary = halve(&boxes_of(&binary));
             collapse.plan(&binary, 1.0, |_| false);
-            (front, stack_need) = make(&mut collapse, &binary, 0);
+            (front, stack_need) = size(make(&mut collapse, &binary, 0));
         }
-        let front = front.len();
         let (nodes, _) = make(&mut collapse, &binary, front);
-        drop(collapse);
+        self.roots = vec![Root::new(&binary, 0, Child::ROOT, stack_need)];
+        drop((collapse, binary));
         self.nodes.iter_mut().for_each(|node| *node = node.moved(front, 0));
         self.nodes.extend(nodes);
         self.nodes.rotate_right(front);
-        self.roots = vec![Root { bounds: bounds(&binary, 0), child: Child::ROOT, stack_need }];
     }
 }
 
-fn of(boxes: &[Box], triangle: u32) -> Aabb {
-    let [low, high] = boxes[triangle as usize];
+fn aabb(&[low, high]: &TightBox) -> Aabb {
     Aabb::new(low.into(), high.into())
 }
 
 /// Orders the triangles so that each part is a range of them.
-fn divide(boxes: &[Box], order: &mut [u32]) -> Vec<Range<usize>> {
-    fn parts(boxes: &[Box], order: &mut [u32], first: usize) -> Vec<Range<usize>> {
+fn divide(boxes: &[TightBox], order: &mut [u32]) -> Vec<Range<usize>> {
+    fn parts(boxes: &[TightBox], order: &mut [u32], first: usize) -> Vec<Range<usize>> {
         if order.len() <= PART {
             return std::iter::once(first..first + order.len()).collect();
         }
-        let at = split(&|member| of(boxes, member), order);
+        let at = split(&|member| aabb(&boxes[member as usize]), order);
         let (left, right) = order.split_at_mut(at);
         let (mut all, more) =
             rayon::join(|| parts(boxes, left, first), || parts(boxes, right, first + at));
@@ -161,7 +158,6 @@ mod tests {
 
     use super::*;
     use crate::leaf::{Corner, Leaf};
-    use crate::wide::Node;
 
     /// Triangles by their corners.
     struct Loose(Vec<[Vec3; 3]>);
@@ -221,7 +217,7 @@ mod tests {
             let tree = build(&triangles);
             let secs = begin.elapsed().as_secs_f64();
             assert!(secs < 10.0, "{what}: {secs:.1} s");
-            assert!(tree.roots[0].stack_need <= STACK_PER_TREE, "{what}");
+            assert!(tree.roots[0].stack_need as usize <= STACK_PER_TREE, "{what}");
         }
     }
 
@@ -233,7 +229,7 @@ mod tests {
             let Tree { nodes, mut leaves, roots } = build(&triangles);
             leaves.extend([0; LONGEST]);
             let mut seen = vec![0; count];
-            let mut work = vec![(roots[0].child, roots[0].bounds)];
+            let mut work = vec![(roots[0].child, roots[0].bounds.map(Vec3A::from))];
             while let Some((child, [low, high])) = work.pop() {
                 if child.is_leaf() {
                     let leaf = Leaf::at(&leaves, child.place());

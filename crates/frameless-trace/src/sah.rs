@@ -20,19 +20,19 @@ const FEW: usize = 32;
 /// Planes per axis, and one.
 const BINS: usize = 16;
 
-/// A binary tree with a box per leaf.
-pub(crate) fn divide(boxes: &[Aabb]) -> Bvh2 {
+/// A binary tree over so many boxes, with one per leaf.
+pub(crate) fn divide(count: u32, boxes: &impl Fn(u32) -> Aabb) -> Bvh2 {
     let mut binary = Bvh2::zeroed(0);
-    if boxes.is_empty() {
+    if count == 0 {
         return binary;
     }
     let around = |members: &[u32]| {
-        members.iter().fold(Aabb::INVALID, |sum, &member| sum.union(&boxes[member as usize]))
+        members.iter().fold(Aabb::INVALID, |sum, &member| sum.union(&boxes(member)))
     };
-    let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
+    let mut order: Vec<u32> = (0..count).collect();
     let nodes = &mut binary.nodes;
-    nodes.reserve_exact(2 * boxes.len() - 1);
-    nodes.push(Bvh2Node::new(around(&order), boxes.len() as u32, 0));
+    nodes.reserve_exact(2 * order.len() - 1);
+    nodes.push(Bvh2Node::new(around(&order), count, 0));
     let mut work = vec![(0, 1)];
     while let Some((at, depth)) = work.pop() {
         binary.max_depth = binary.max_depth.max(depth);
@@ -41,7 +41,7 @@ pub(crate) fn divide(boxes: &[Aabb]) -> Bvh2 {
             continue;
         }
         let members = &mut order[first..first + count];
-        let left = split(&|member| boxes[member as usize], members);
+        let left = split(boxes, members);
         let next = nodes.len();
         nodes[at].make_inner(next as u32);
         for (members, first) in [(&members[..left], first), (&members[left..], first + left)] {
@@ -201,7 +201,7 @@ mod tests {
         let scattered = (0..500).map(|_| Aabb::from_points(&[point(), point()])).collect();
         let alike = vec![Aabb::new(Vec3A::ZERO, Vec3A::ONE); 500];
         for boxes in [scattered, alike] {
-            let binary = divide(&boxes);
+            let binary = divide(boxes.len() as u32, &|k| boxes[k as usize]);
             assert_eq!(binary.nodes.len(), 2 * boxes.len() - 1);
             let leaves = binary.nodes.iter().filter(|node| node.is_leaf());
             let mut found: Vec<u32> = leaves
