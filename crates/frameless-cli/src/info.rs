@@ -111,7 +111,7 @@ fn mesh_bytes(mesh: &Mesh) -> usize {
         + mesh.uvs.iter().map(|set| size_of_val(&set[..])).sum::<usize>()
         + size_of_val(&mesh.colors[..])
         + size_of_val(&mesh.triangles[..])
-        + size_of_val(&mesh.triangle_materials[..])
+        + mesh.triangle_materials.bytes()
         + mesh.influences.iter().map(influence_bytes).sum::<usize>()
         + mesh.targets.iter().map(target_bytes).sum::<usize>()
 }

@@ -1,6 +1,9 @@
 //! From the text of an argument to a checked value.
 
+use std::convert::Infallible;
+
 use frameless::{ReconstructionKind, Size, ToneMap};
+use frameless_scene::{AnimationChoice, Pick};
 
 /// Longest side of a picture: what GPUs take as a texture.
 const MAX_SIDE: u32 = 16_384;
@@ -41,6 +44,22 @@ pub(crate) fn positive(text: &str) -> Result<f64, String> {
     match finite(text) {
         Ok(number) if number > 0.0 => Ok(number),
         _ => Err("wanted a number above zero".into()),
+    }
+}
+
+/// Which of a file's scenes. No name is that of every scene without one.
+pub(crate) fn pick(text: &str) -> Result<Pick, String> {
+    match text {
+        "" => Err("wanted a number from 0, or a name".into()),
+        _ => text.parse().map_err(|never: Infallible| match never {}),
+    }
+}
+
+/// Which of a file's animations.
+pub(crate) fn animation(text: &str) -> Result<AnimationChoice, String> {
+    match text {
+        "" => Err("wanted a number from 0, a name, all or none".into()),
+        _ => text.parse().map_err(|never: Infallible| match never {}),
     }
 }
 

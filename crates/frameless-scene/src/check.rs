@@ -220,7 +220,7 @@ fn check_mesh(mesh: &Mesh, materials: usize) -> Result<(), String> {
     let in_bounds = mesh.triangles.iter().flatten().all(|&v| (v as usize) < vertices);
     wanted(in_bounds, "triangles of existing vertices")?;
     check_targets(mesh)?;
-    let known = mesh.triangle_materials.iter().all(|&m| (m as usize) < materials);
+    let known = mesh.triangle_materials.used().all(|m| (m as usize) < materials);
     wanted(
         known && mesh.triangle_materials.len() == mesh.triangles.len(),
         "a material per triangle",

@@ -8,6 +8,7 @@ mod deform;
 mod environment;
 mod gltf;
 mod material;
+mod runs;
 mod scene;
 mod state;
 mod texture;
@@ -22,6 +23,7 @@ pub use gltf::{
     AnimationChoice, Choice, Limits, LoadError, Pick, Place, Problem, load, load_bytes, load_chosen,
 };
 pub use material::{AlphaMode, Layers, Material, Volume};
+pub use runs::TriangleMaterials;
 pub use scene::{
     Camera, Contents, Deformation, Geometry, Influences, Instance, Light, LightKind, Mesh,
     MorphTarget, Node, Projection, Scene, Skin, Transform, UV_SETS,

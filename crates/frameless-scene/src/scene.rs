@@ -10,6 +10,7 @@ use glam::{Affine3A, Quat, Vec2, Vec3, Vec4};
 use crate::animation::Animation;
 use crate::environment::Environment;
 use crate::material::Material;
+use crate::runs::TriangleMaterials;
 use crate::texture::{Image, Texture};
 
 /// Sets of texture coordinates that a mesh may have.
@@ -122,7 +123,7 @@ pub struct Mesh {
     /// Three vertices each, counter-clockwise seen from the front; in bounds.
     pub triangles: Vec<[u32; 3]>,
     /// Index into [`Scene::materials`], per triangle.
-    pub triangle_materials: Vec<u32>,
+    pub triangle_materials: TriangleMaterials,
     /// Shapes that weights blend in, see [`Deformation::weights`].
     pub targets: Vec<MorphTarget>,
     /// Which joints move each vertex, four per set; empty: the mesh cannot be skinned.

@@ -167,7 +167,7 @@ fn sphere(material: u32, from: Vec3, along: Vec3) -> Option<Hit> {
 /// Möller and Trumbore 1997, front faces only.
 fn triangles(mesh: &Mesh, from: Vec3, along: Vec3) -> Option<Hit> {
     let mut nearest: Option<Hit> = None;
-    for (triangle, &material) in mesh.triangles.iter().zip(&mesh.triangle_materials) {
+    for (triangle, material) in mesh.triangles.iter().zip(mesh.triangle_materials.iter()) {
         let [a, b, c] = triangle.map(|v| mesh.positions[v as usize]);
         let (ab, ac, to) = (b - a, c - a, from - a);
         let p = along.cross(ac);

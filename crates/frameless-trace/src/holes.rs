@@ -42,7 +42,7 @@ pub(crate) fn may_have_holes(scene: &Scene, mesh: &Mesh) -> bool {
             }
     };
     let lets_pass: Vec<bool> = scene.materials.iter().map(lets_pass).collect();
-    mesh.triangle_materials.iter().any(|&m| lets_pass.get(m as usize) == Some(&true))
+    mesh.triangle_materials.used().any(|m| lets_pass.get(m as usize) == Some(&true))
 }
 
 impl World {

@@ -206,7 +206,7 @@ pub(crate) fn image(surface: Surface, object: u32, throughput: Vec3A) -> Surface
 
 #[cfg(test)]
 mod tests {
-    use frameless_scene::{Material, Mesh, Transform};
+    use frameless_scene::{Material, Mesh, Transform, TriangleMaterials};
     use glam::Vec3;
 
     use super::*;
@@ -217,7 +217,7 @@ mod tests {
         let mesh = Mesh {
             positions: outline.iter().map(|&[x, y]| Vec3::new(x, y, 0.0)).collect(),
             triangles: (2..outline.len() as u32).map(|i| [0, i - 1, i]).collect(),
-            triangle_materials: vec![0; outline.len() - 2],
+            triangle_materials: TriangleMaterials::all(0, outline.len() - 2),
             ..Mesh::default()
         };
         let mut scene = scenes::empty();

@@ -4,7 +4,9 @@ use std::f32::consts::PI;
 use std::sync::Arc;
 
 use frameless::{Request, Size};
-use frameless_scene::{Geometry, Material, Mesh, Projection, Scene, Transform, View, look_at};
+use frameless_scene::{
+    Geometry, Material, Mesh, Projection, Scene, Transform, TriangleMaterials, View, look_at,
+};
 use glam::{Quat, Vec3};
 
 use crate::integrator::{Integrator, Settings};
@@ -82,7 +84,7 @@ fn lamp(scene: &mut Scene, side: f32, height: f32, radiance: f32) {
     let square = Mesh {
         positions: corners.map(|[x, z]| Vec3::new(x, 0.0, z)).to_vec(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
-        triangle_materials: vec![glow; 2],
+        triangle_materials: TriangleMaterials::all(glow, 2),
         ..Mesh::default()
     };
     let place = Transform {

@@ -27,7 +27,7 @@ const MOST_EDGES: usize = 32;
 pub(crate) fn planes(scene: &Scene, mesh: &Mesh) -> (Vec<Option<u16>>, Vec<Plane>) {
     let is_mirror =
         |material: u32| scene.materials.get(material as usize).is_some_and(is_pure_mirror);
-    if !mesh.triangle_materials.iter().any(|&material| is_mirror(material)) {
+    if !mesh.triangle_materials.used().any(is_mirror) {
         return Default::default();
     }
     let mut found: Vec<Found> = Vec::new();
@@ -134,7 +134,7 @@ fn area(polygon: &[Vec2]) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use frameless_scene::{Geometry, Material};
+    use frameless_scene::{Geometry, Material, TriangleMaterials};
 
     use super::*;
     use crate::test_scenes as scenes;
@@ -182,12 +182,13 @@ mod tests {
     #[test]
     fn only_triangles_that_mirror_and_nothing_else_count() {
         let mut block = block();
-        block.triangle_materials[0] = 1;
+        let others = block.triangle_materials.iter().skip(1);
+        block.triangle_materials = std::iter::once(1).chain(others).collect();
         // Half a side is a triangle, which is convex as well.
         let (plane_of, found) = planes(&scene(), &block);
         assert_eq!((plane_of[0], found.len()), (None, 6));
         assert_eq!(found[0].outline.len(), 3);
-        block.triangle_materials.fill(1);
+        block.triangle_materials = TriangleMaterials::all(1, block.triangles.len());
         assert!(planes(&scene(), &block).1.is_empty());
     }
 

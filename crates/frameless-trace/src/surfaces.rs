@@ -6,7 +6,7 @@ use std::sync::Arc;
 use frameless::{Request, Size};
 use frameless_scene::{
     AlphaMode, Environment, Filter, Geometry, Image, Layers, Material, Mesh, Minify, Projection,
-    Scene, Texture, TextureRef, Transform, View, Volume, Wrap, look_at,
+    Scene, Texture, TextureRef, Transform, TriangleMaterials, View, Volume, Wrap, look_at,
 };
 use glam::{Quat, Vec2, Vec3, Vec4};
 
@@ -41,7 +41,7 @@ fn pane(scene: &mut Scene, z: f32, material: Material) -> u32 {
     let mut mesh = Mesh {
         positions: corners.map(|[x, y]| Vec3::new(x, y, 0.0)).to_vec(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
-        triangle_materials: vec![scene.materials.len() as u32; 2],
+        triangle_materials: TriangleMaterials::all(scene.materials.len() as u32, 2),
         ..Mesh::default()
     };
     mesh.uvs[0] = corners.map(|[x, y]| Vec2::new(0.5 + 0.5 * x, 0.5 - 0.5 * y)).to_vec();

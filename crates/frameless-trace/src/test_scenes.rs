@@ -5,7 +5,7 @@ use std::sync::Arc;
 use frameless::{Rng, Size};
 use frameless_scene::{
     Camera, Geometry, Instance, Light, LightKind, Material, Mesh, Node, Projection, Scene,
-    Transform,
+    Transform, TriangleMaterials,
 };
 use glam::{Quat, Vec3, Vec4};
 
@@ -72,7 +72,7 @@ pub(crate) fn floor(half: f32, y: f32, material: u32) -> Geometry {
 }
 
 pub(crate) fn mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>, material: u32) -> Geometry {
-    let triangle_materials = vec![material; triangles.len()];
+    let triangle_materials = TriangleMaterials::all(material, triangles.len());
     Geometry::Mesh(Mesh { positions, triangles, triangle_materials, ..Mesh::default() })
 }
 

@@ -9,7 +9,7 @@ use frameless::{
 use frameless_scene::{
     AfterEnd, Animation, Camera, Channel, Deformation, Geometry, Influences, Instance,
     Interpolation, Limits, Material, Mesh, MorphTarget, Node, Projection, Scene, Skin, Target,
-    Transform, Values,
+    Transform, TriangleMaterials, Values,
 };
 use frameless_trace::{CpuTracer, Settings, ViewSource, World, render, thread_pool};
 use glam::{Affine3A, Quat, Vec3, Vec4};
@@ -40,7 +40,7 @@ fn bending_sheet() -> Scene {
         let a = y * (SIDE + 1) + x;
         mesh.triangles.extend([[a, a + 1, a + SIDE + 1], [a + 1, a + SIDE + 2, a + SIDE + 1]]);
     }
-    mesh.triangle_materials = vec![0; mesh.triangles.len()];
+    mesh.triangle_materials = TriangleMaterials::all(0, mesh.triangles.len());
     mesh.influences = vec![Influences { joints, weights }];
     mesh.targets = vec![MorphTarget { positions: bulge, ..MorphTarget::default() }];
     let channel = |target, values| Channel {
@@ -91,7 +91,7 @@ fn mirrored_sheet() -> Scene {
     scene.geometries.push(Geometry::Mesh(Mesh {
         positions: corners.map(|[x, z]| Vec3::new(x, -1.7, z)).to_vec(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
-        triangle_materials: vec![1; 2],
+        triangle_materials: TriangleMaterials::all(1, 2),
         ..Mesh::default()
     }));
     scene.instances.push(Instance { node: 1, geometry: 1 });

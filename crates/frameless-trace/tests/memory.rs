@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use frameless_scene::{
     Camera, Geometry, Instance, Material, Mesh, Node, Projection, Scene, Transform,
+    TriangleMaterials,
 };
 use frameless_trace::{World, thread_pool};
 use glam::Vec3;
@@ -33,7 +34,7 @@ fn waves() -> Scene {
     let triangles: Vec<[u32; 3]> = (0..SIDE * SIDE).flat_map(square).collect();
     let mesh = Mesh {
         positions: (0..(SIDE + 1) * (SIDE + 1)).map(vertex).collect(),
-        triangle_materials: vec![0; triangles.len()],
+        triangle_materials: TriangleMaterials::all(0, triangles.len()),
         triangles,
         ..Mesh::default()
     };

@@ -24,12 +24,12 @@ pub(crate) struct OpenArgs {
 #[derive(ClapArgs, Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct ChoiceArgs {
     /// Show this of the file's scenes: a number from 0, or a name [default: the one that the file names, else its first]
-    #[arg(long = "scene", value_name = "N|NAME")]
+    #[arg(long = "scene", value_name = "N|NAME", value_parser = parse::pick)]
     pub(crate) file_scene: Option<Pick>,
 
     /// Play this of the file's animations: a number from 0, a name, all or none [default: all at once; the first alone if two
     /// of them move the same thing]
-    #[arg(long, value_name = "N|NAME|all|none")]
+    #[arg(long, value_name = "N|NAME|all|none", value_parser = parse::animation)]
     pub(crate) animation: Option<AnimationChoice>,
 }
 
@@ -86,19 +86,23 @@ pub(crate) struct LimitArgs {
     /// Meshes at nodes
     #[arg(long, value_name = "N", default_value_t = Limits::default().instances)]
     max_instances: u64,
+
+    /// Lights at nodes
+    #[arg(long, value_name = "N", default_value_t = Limits::default().lights)]
+    max_lights: u64,
 }
 
 impl Default for LimitArgs {
     fn default() -> LimitArgs {
-        let Limits { decoded_bytes, triangles, total_pixels, nodes, node_depth, instances, .. } =
-            Limits::default();
+        let limits = Limits::default();
         LimitArgs {
-            max_memory: decoded_bytes,
-            max_triangles: triangles,
-            max_texture_pixels: total_pixels,
-            max_nodes: nodes,
-            max_nesting: node_depth,
-            max_instances: instances,
+            max_memory: limits.decoded_bytes,
+            max_triangles: limits.triangles,
+            max_texture_pixels: limits.total_pixels,
+            max_nodes: limits.nodes,
+            max_nesting: limits.node_depth,
+            max_instances: limits.instances,
+            max_lights: limits.lights,
         }
     }
 }
@@ -123,6 +127,7 @@ impl LimitArgs {
             nodes: self.max_nodes,
             node_depth: self.max_nesting,
             instances: self.max_instances,
+            lights: self.max_lights,
             keyframes: scaled(default.keyframes),
             json_values: scaled(default.json_values),
             ..default

@@ -143,7 +143,7 @@ pub(super) fn add_rectangle(
         mesh.uvs[0].push(metres / texture_size);
     }
     mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
-    mesh.triangle_materials.extend([material; 2]);
+    mesh.triangle_materials.resize(mesh.triangles.len(), material);
 }
 
 fn push<T>(list: &mut Vec<T>, item: T) -> u32 {

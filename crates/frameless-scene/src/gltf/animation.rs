@@ -220,6 +220,7 @@ impl Keys {
     ) -> Result<(), Fault> {
         let Document { accessors, budget, warnings, .. } = document;
         let (output, per_key) = (&accessors[self.output], self.per_key());
+        budget.allocate(sampler.pointer(), self.times.len(), size_of::<f32>())?;
         let mut add = |target: Target, kept: usize, times: Vec<f32>, values: Values| {
             if kept < self.times.len() {
                 warnings.about("keys without a usable time or value were left out", owner);

@@ -108,17 +108,20 @@ impl<'a> Compressed<'a> {
     }
 
     fn decode(&self, json: &Json<'_>, budget: &mut Budget) -> Result<Vec<u8>, Fault> {
-        // Once as elements, once as bytes.
-        budget.allocate(json.pointer(), self.count, 2 * self.stride)?;
+        budget.allocate(json.pointer(), self.count, self.stride)?;
+        // As bytes, in this machine's order, where the decoder lets us: a copy would be the largest thing in memory.
+        let (bytes, count) = (self.bytes, self.count);
         let decoded = match (self.mode, self.stride) {
             (Mode::Attributes, _) => self.attributes(),
-            (Mode::Triangles, 2) => meshopt::decode_index_buffer::<u16>(self.bytes, self.count)
+            (Mode::Triangles, 2) => {
+                meshopt::decode_index_buffer::<[u8; 2]>(bytes, count).map(little_endian)
+            }
+            (Mode::Triangles, _) => {
+                meshopt::decode_index_buffer::<[u8; 4]>(bytes, count).map(little_endian)
+            }
+            (Mode::Indices, 2) => meshopt::decode_index_sequence::<u16>(bytes, count)
                 .map(|indices| indices.into_iter().flat_map(u16::to_le_bytes).collect()),
-            (Mode::Triangles, _) => meshopt::decode_index_buffer::<u32>(self.bytes, self.count)
-                .map(|indices| indices.into_iter().flat_map(u32::to_le_bytes).collect()),
-            (Mode::Indices, 2) => meshopt::decode_index_sequence::<u16>(self.bytes, self.count)
-                .map(|indices| indices.into_iter().flat_map(u16::to_le_bytes).collect()),
-            (Mode::Indices, _) => meshopt::decode_index_sequence::<u32>(self.bytes, self.count)
+            (Mode::Indices, _) => meshopt::decode_index_sequence::<u32>(bytes, count)
                 .map(|indices| indices.into_iter().flat_map(u32::to_le_bytes).collect()),
         };
         let mut bytes = decoded.map_err(|error| {
@@ -201,6 +204,16 @@ impl<const N: usize> Default for Element<N> {
     }
 }
 
+/// Their bytes, where they lie.
 fn flat<const N: usize>(elements: Vec<Element<N>>) -> Vec<u8> {
-    elements.iter().flat_map(|element| element.0.as_flattened()).copied().collect()
+    let words: Vec<[[u8; 4]; N]> = elements.into_iter().map(|element| element.0).collect();
+    words.into_flattened().into_flattened()
+}
+
+/// The bytes of numbers that are in this machine's order, as glTF has them.
+fn little_endian<const N: usize>(mut numbers: Vec<[u8; N]>) -> Vec<u8> {
+    if cfg!(target_endian = "big") {
+        numbers.iter_mut().for_each(|number| number.reverse());
+    }
+    numbers.into_flattened()
 }

@@ -56,7 +56,10 @@ fn split_glb<'a>(bytes: &'a [u8], warnings: &mut Warnings) -> Result<Container<'
     let mut offset = first.end;
     while offset < bytes.len() {
         let chunk = Chunk::at(bytes, offset)?;
-        if chunk.kind == BIN_CHUNK && bin.is_none() {
+        if chunk.kind == BIN_CHUNK {
+            if bin.is_some() {
+                return Err(Fault::at_byte(offset, "one binary chunk at most", chunk.name()));
+            }
             bin = Some(chunk.data);
         } else {
             warnings.about("GLB chunks that have no place were ignored", chunk.name());

@@ -114,10 +114,10 @@ fn has_glowing_triangles(scene: &Scene) -> bool {
     const LAMP_RADIANCE: f32 = 1.0;
     let is_lamp = |m: &Material| scene.mean_radiance(m).max_element() >= LAMP_RADIANCE;
     let lamps: Vec<bool> = scene.materials.iter().map(is_lamp).collect();
-    let glows = |material: &u32| lamps[*material as usize];
+    let glows = |material: u32| lamps[material as usize];
     scene.instances.iter().any(|instance| match &scene.geometries[instance.geometry as usize] {
-        Geometry::Mesh(mesh) => mesh.triangle_materials.iter().any(glows),
-        Geometry::Sphere { material } => glows(material),
+        Geometry::Mesh(mesh) => mesh.triangle_materials.used().any(glows),
+        Geometry::Sphere { material } => glows(*material),
     })
 }
 

@@ -2,10 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use serde_json::Value;
-
 use super::error::{Fault, Place, Problem, quoted};
 use super::json::Json;
+use super::value::Value;
 use super::warnings::Warnings;
 
 /// Extensions that are read. What of them is not drawn is warned about where it occurs.
@@ -29,7 +28,7 @@ const SUPPORTED: [&str; 14] = [
 /// Refuses a file that cannot be understood without an extension which is not supported; warns of those without which it can.
 pub(super) fn check_extensions(
     root: &Json<'_>,
-    value: &Value,
+    value: &Value<'_>,
     warnings: &mut Warnings,
 ) -> Result<(), Fault> {
     for required in root.list("extensionsRequired")? {
@@ -53,16 +52,16 @@ pub(super) fn check_extensions(
 
 /// The keys of all `extensions` objects but those in `extras`; undeclared ones are ignored just like declared ones. Walks
 /// without recursion.
-fn collect_names<'a>(value: &'a Value, names: &mut BTreeSet<&'a str>) {
+fn collect_names<'a>(value: &'a Value<'a>, names: &mut BTreeSet<&'a str>) {
     let mut open = vec![value];
     while let Some(value) = open.pop() {
         match value {
             Value::Array(elements) => open.extend(elements),
             Value::Object(members) => {
-                if let Some(Value::Object(extensions)) = members.get("extensions") {
-                    names.extend(extensions.keys().map(String::as_str));
+                if let Some(Value::Object(extensions)) = value.get("extensions") {
+                    names.extend(extensions.iter().map(|(name, _)| name.as_ref()));
                 }
-                let others = members.iter().filter(|(key, _)| *key != "extras");
+                let others = members.iter().filter(|(key, _)| key != "extras");
                 open.extend(others.map(|(_, member)| member));
             }
             _ => {}

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use glam::{Quat, Vec3};
+use glam::{Affine3A, Quat, Vec3};
 
-use crate::{Deformation, Geometry, Instance, Mesh, Node, Scene, Skin, Transform};
+use crate::{Deformation, Geometry, Instance, Mesh, MorphTarget, Node, Scene, Skin, Transform};
 
 use super::document::Document;
 use super::error::Fault;
@@ -22,10 +22,12 @@ pub(super) fn place_instances(
     document: &mut Document<'_>,
     hierarchy: &mut Hierarchy,
     skins: Vec<Option<Skin>>,
+    same_as: Vec<usize>,
 ) -> Result<WeightsOfNode, Fault> {
     let nodes = document.root.list("nodes")?;
     let mut placer = Placer {
         file_meshes: std::mem::take(&mut scene.geometries),
+        same_as,
         mesh_list: document.root.list("meshes")?,
         geometry_of: Vec::new(),
         file_skins: skins,
@@ -62,6 +64,8 @@ fn number(numbers: &mut [Option<u32>], index: usize, next: &mut u32) -> u32 {
 
 struct Placer<'a> {
     file_meshes: Vec<Geometry>,
+    /// See [`super::mesh::Meshes`].
+    same_as: Vec<usize>,
     mesh_list: Vec<Json<'a>>,
     /// Per mesh of the file, once it is used.
     geometry_of: Vec<Option<u32>>,
@@ -90,7 +94,8 @@ impl Placer<'_> {
         let Some(reference) = node.field("mesh")? else { return Ok(()) };
         let mesh_index = reference.index(self.file_meshes.len(), "meshes")?;
         let Some(index) = hierarchy.index_of[file_index] else { return Ok(()) };
-        let Geometry::Mesh(mesh) = &self.file_meshes[mesh_index] else { return Ok(()) };
+        let shape = self.same_as[mesh_index];
+        let Geometry::Mesh(mesh) = &self.file_meshes[shape] else { return Ok(()) };
         if mesh.triangles.is_empty() {
             return Ok(());
         }
@@ -108,7 +113,8 @@ impl Placer<'_> {
         let all = (scene.instances.len() + places.len()) as u64;
         within(all, document.budget.limits.instances, "instances", node.pointer())?;
         let size = (mesh.positions.len(), mesh.triangles.len());
-        let geometry = number(&mut self.geometry_of, mesh_index, &mut self.geometries);
+        let pose_bytes = pose_bytes(mesh, skin.and_then(|skin| self.file_skins[skin].as_ref()));
+        let geometry = number(&mut self.geometry_of, shape, &mut self.geometries);
         let skin = skin.map(|skin| number(&mut self.skin_of, skin, &mut self.skins));
         for node_index in places {
             scene.instances.push(Instance { node: node_index, geometry });
@@ -116,6 +122,7 @@ impl Placer<'_> {
                 // Every instance that deforms has vertices and triangles of its own.
                 document.budget.add_vertices(node.pointer(), size.0)?;
                 document.budget.add_triangles(node.pointer(), size.1)?;
+                document.budget.allocate(node.pointer(), pose_bytes, 1)?;
                 let (instance, weights) = (scene.instances.len() as u32 - 1, weights.clone());
                 scene.deformations.push(Deformation { instance, skin, weights });
             }
@@ -186,6 +193,17 @@ impl Placer<'_> {
     }
 }
 
+/// What an instance takes for its joints, and what of morph targets has to be read for each of its poses.
+fn pose_bytes(mesh: &Mesh, skin: Option<&Skin>) -> usize {
+    // Now and before.
+    let joints = skin.map_or(0, |skin| 2 * skin.joints.len() * size_of::<Affine3A>());
+    let displaced = |target: &MorphTarget| {
+        let [positions, normals] = [&target.positions, &target.normals];
+        size_of_val(&positions[..]) + size_of_val(&normals[..]) + size_of_val(&target.colors[..])
+    };
+    joints + mesh.targets.iter().map(displaced).sum::<usize>()
+}
+
 /// Where EXT_mesh_gpu_instancing wants the mesh, in the node's coordinates.
 fn read_places(
     node: &Json<'_>,
@@ -226,6 +244,9 @@ fn read_places(
     Ok(Some(places.unwrap_or_default()))
 }
 
+/// Itself, where it stands in the world, and its box.
+const BYTES_PER_NODE: usize = 256;
+
 /// A node below `parent` for every place that has finite numbers.
 fn add_nodes(
     places: &[Transform],
@@ -234,6 +255,7 @@ fn add_nodes(
     document: &mut Document<'_>,
     hierarchy: &mut Hierarchy,
 ) -> Result<Vec<u32>, Fault> {
+    document.budget.allocate(node.pointer(), places.len(), BYTES_PER_NODE)?;
     let mut indices = Vec::with_capacity(places.len());
     for &rest in places {
         if !(rest.translation.is_finite() && rest.scale.is_finite()) {

@@ -1,19 +1,20 @@
 //! A JSON value that knows where it stands, so that every complaint names its JSON pointer.
 
-use serde_json::Value;
+use std::borrow::Cow;
 
 use super::error::{Fault, Place, Problem, quoted};
-use super::limits::{Limits, within};
+use super::limits::{Budget, within};
+use super::value::Value;
 
 /// A value in the document.
 #[derive(Clone, Debug)]
 pub(super) struct Json<'a> {
-    value: &'a Value,
+    value: &'a Value<'a>,
     pointer: String,
 }
 
 impl<'a> Json<'a> {
-    pub(super) fn root(value: &'a Value) -> Json<'a> {
+    pub(super) fn root(value: &'a Value<'a>) -> Json<'a> {
         Json { value, pointer: String::new() }
     }
 
@@ -28,8 +29,9 @@ impl<'a> Json<'a> {
 
     /// A member of this object, if it is there.
     pub(super) fn field(&self, key: &str) -> Result<Option<Json<'a>>, Fault> {
-        let members = self.value.as_object().ok_or_else(|| self.fault("an object"))?;
-        Ok(members.get(key).map(|value| Json { value, pointer: child(&self.pointer, key) }))
+        self.object()?;
+        let value = self.value.get(key);
+        Ok(value.map(|value| Json { value, pointer: child(&self.pointer, key) }))
     }
 
     /// A member of this object that must be there.
@@ -39,16 +41,28 @@ impl<'a> Json<'a> {
 
     /// All members of this object.
     pub(super) fn members(&self) -> Result<Vec<(&'a str, Json<'a>)>, Fault> {
-        let members = self.value.as_object().ok_or_else(|| self.fault("an object"))?;
-        Ok(members
-            .iter()
-            .map(|(key, value)| (key.as_str(), Json { value, pointer: child(&self.pointer, key) }))
-            .collect())
+        let members = self.object()?.iter();
+        let json = |value, key| Json { value, pointer: child(&self.pointer, key) };
+        Ok(members.map(|(key, value)| (key.as_ref(), json(value, key))).collect())
+    }
+
+    fn object(&self) -> Result<&'a [(Cow<'a, str>, Value<'a>)], Fault> {
+        match self.value {
+            Value::Object(members) => Ok(members),
+            _ => Err(self.fault("an object")),
+        }
+    }
+
+    fn array(&self) -> Option<&'a [Value<'a>]> {
+        match self.value {
+            Value::Array(elements) => Some(elements),
+            _ => None,
+        }
     }
 
     /// The elements of this array.
     pub(super) fn elements(&self) -> Result<Vec<Json<'a>>, Fault> {
-        let elements = self.value.as_array().ok_or_else(|| self.fault("an array"))?;
+        let elements = self.array().ok_or_else(|| self.fault("an array"))?;
         Ok(elements
             .iter()
             .enumerate()
@@ -61,6 +75,14 @@ impl<'a> Json<'a> {
         self.field(key)?.map_or(Ok(Vec::new()), |array| array.elements())
     }
 
+    /// How many elements an array member has; none if it is none.
+    pub(super) fn count(&self, key: &str) -> usize {
+        match self.value.get(key) {
+            Some(Value::Array(elements)) => elements.len(),
+            _ => 0,
+        }
+    }
+
     /// A member of `extensions`, if it is there.
     pub(super) fn extension(&self, name: &str) -> Result<Option<Json<'a>>, Fault> {
         self.field("extensions")?.map_or(Ok(None), |extensions| extensions.field(name))
@@ -69,11 +91,14 @@ impl<'a> Json<'a> {
     /// A whole number from 0 to 2⁵³; `3.0` is one, as JSON does not tell them apart.
     pub(super) fn unsigned(&self) -> Result<usize, Fault> {
         const LARGEST_EXACT: f64 = 9_007_199_254_740_992.0;
-        let number = self.value.as_u64().or_else(|| {
-            let number = self.value.as_f64()?;
-            let whole = number.fract() == 0.0 && (0.0..=LARGEST_EXACT).contains(&number);
-            whole.then_some(number as u64)
-        });
+        let number = match *self.value {
+            Value::Unsigned(number) => Some(number),
+            Value::Float(number) => {
+                let whole = number.fract() == 0.0 && (0.0..=LARGEST_EXACT).contains(&number);
+                whole.then_some(number as u64)
+            }
+            _ => None,
+        };
         number
             .and_then(|number| usize::try_from(number).ok())
             .ok_or_else(|| self.fault("a whole number from 0 to 2^53"))
@@ -97,7 +122,7 @@ impl<'a> Json<'a> {
     /// An array of exactly `N` finite numbers.
     pub(super) fn numbers<const N: usize>(&self) -> Result<[f32; N], Fault> {
         let wrong_length = || self.fault(format!("an array of {N} numbers"));
-        let elements = self.value.as_array().ok_or_else(wrong_length)?;
+        let elements = self.array().ok_or_else(wrong_length)?;
         if elements.len() != N {
             return Err(wrong_length());
         }
@@ -113,7 +138,10 @@ impl<'a> Json<'a> {
     }
 
     pub(super) fn boolean(&self) -> Result<bool, Fault> {
-        self.value.as_bool().ok_or_else(|| self.fault("true or false"))
+        match self.value {
+            Value::Bool(truth) => Ok(*truth),
+            _ => Err(self.fault("true or false")),
+        }
     }
 
     /// A number member, or `default` if it is not there.
@@ -145,10 +173,17 @@ impl<'a> Json<'a> {
         self.value.get("name").and_then(Value::as_str).unwrap_or_default().to_owned()
     }
 
-    /// How a message calls this value: `mesh "wheel"`, or `/meshes/3` if it has no name.
+    /// How a message calls this value: `mesh "wheel" (/meshes/3)`, or `/meshes/3` if it has no name.
     pub(super) fn called(&self, what: &str) -> String {
-        let name = self.name();
-        if name.is_empty() { self.pointer.clone() } else { format!("{what} {}", quoted(&name)) }
+        called(what, &self.name(), &self.pointer)
+    }
+}
+
+/// The same of a thing that is known by its name, which may be empty, and where it stands.
+pub(super) fn called(what: &str, name: &str, pointer: &str) -> String {
+    match name {
+        "" => pointer.to_owned(),
+        _ => format!("{what} {} ({pointer})", quoted(name)),
     }
 }
 
@@ -157,28 +192,38 @@ fn child(pointer: &str, key: &str) -> String {
     format!("{pointer}/{}", key.replace('~', "~0").replace('/', "~1"))
 }
 
-fn summary(value: &Value) -> String {
+fn summary(value: &Value<'_>) -> String {
     match value {
         Value::Null => "null".to_owned(),
         Value::Bool(truth) => truth.to_string(),
-        Value::Number(number) => number.to_string(),
-        Value::String(text) => quoted(text),
+        Value::Unsigned(number) => number.to_string(),
+        Value::Negative(number) => number.to_string(),
+        // Which has an exponent where it is better read so.
+        Value::Float(number) => format!("{number:?}"),
+        Value::Text(text) => quoted(text),
+        Value::Unescaped(text) => quoted(text),
         Value::Array(elements) => format!("an array of {}", elements.len()),
         Value::Object(_) => "an object".to_owned(),
     }
 }
 
 /// Parses JSON text that begins at byte `offset` of the file.
-pub(super) fn parse(text: &[u8], offset: usize, limits: &Limits) -> Result<Value, Fault> {
-    check_size(text, limits)?;
+pub(super) fn parse<'a>(
+    text: &'a [u8],
+    offset: usize,
+    budget: &mut Budget,
+) -> Result<Value<'a>, Fault> {
+    check_size(text, budget)?;
     serde_json::from_slice(text).map_err(|error| Fault {
         place: Place::Byte((offset + byte_of(text, error.line(), error.column())) as u64),
         problem: Problem::Json(error.to_string()),
     })
 }
 
-/// Counts brackets and separators outside strings, since a parsed value needs up to fifty times the memory of its text.
-fn check_size(text: &[u8], limits: &Limits) -> Result<(), Fault> {
+/// Counts brackets and separators outside strings, since a parsed value needs up to thirty times the memory of its text.
+fn check_size(text: &[u8], budget: &mut Budget) -> Result<(), Fault> {
+    /// Its own 24, a key's as many, and what those need who read it.
+    const BYTES_PER_VALUE: usize = 64;
     let (mut depth, mut deepest, mut values) = (0_u64, 0_u64, 0_u64);
     let mut bytes = text.iter();
     while let Some(byte) = bytes.next() {
@@ -194,8 +239,9 @@ fn check_size(text: &[u8], limits: &Limits) -> Result<(), Fault> {
             _ => {}
         }
     }
-    within(deepest, limits.json_depth, "levels of JSON nesting", "")?;
-    within(values, limits.json_values, "JSON values", "")
+    within(deepest, budget.limits.json_depth, "levels of JSON nesting", "")?;
+    within(values, budget.limits.json_values, "JSON values", "")?;
+    budget.allocate("", values as usize, BYTES_PER_VALUE)
 }
 
 /// Moves behind the quote that ends a string.
@@ -221,9 +267,15 @@ fn byte_of(text: &[u8], line: usize, column: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Limits;
+
+    fn parse_within<'a>(text: &'a [u8], limits: &Limits) -> Result<Value<'a>, Fault> {
+        parse(text, 0, &mut Budget::new(limits))
+    }
 
     fn problem(text: &str, read: impl Fn(Json<'_>) -> Result<(), Fault>) -> String {
-        let value = parse(text.as_bytes(), 0, &Limits::default()).expect("the test's JSON is fine");
+        let value = parse_within(text.as_bytes(), &Limits::default());
+        let value = value.expect("the test's JSON is fine");
         read(Json::root(&value)).expect_err("the test's JSON is refused").in_file("f").to_string()
     }
 
@@ -243,7 +295,7 @@ mod tests {
         );
         assert_eq!(
             problem(r#"{"m":[1,1e300]}"#, matrix),
-            "f: /m/1: wanted a 32-bit number, got 1e+300"
+            "f: /m/1: wanted a 32-bit number, got 1e300"
         );
         let not_an_object = |json: Json<'_>| json.required("m")?.field("x").map(drop);
         assert_eq!(
@@ -255,28 +307,29 @@ mod tests {
     #[test]
     fn whole_numbers_may_be_written_as_floats() {
         for (text, expected) in [("3", Some(3)), ("3.0", Some(3)), ("3e2", Some(300))] {
-            let value: Value = serde_json::from_str(text).unwrap();
+            let value: Value<'_> = serde_json::from_str(text).unwrap();
             assert_eq!(Json::root(&value).unsigned().ok(), expected, "{text}");
         }
         for text in ["3.5", "-1", "1e300", "null", "\"3\""] {
-            let value: Value = serde_json::from_str(text).unwrap();
+            let value: Value<'_> = serde_json::from_str(text).unwrap();
             assert!(Json::root(&value).unsigned().is_err(), "{text}");
         }
     }
 
     #[test]
     fn syntax_errors_name_the_byte_in_the_file() {
-        let fault = parse(b"{\n  \"a\": x}", 20, &Limits::default()).unwrap_err();
+        let fault = parse(b"{\n  \"a\": x}", 20, &mut Budget::new(&Limits::default()));
+        let fault = fault.unwrap_err();
         assert_eq!(fault.place, Place::Byte(20 + 9));
     }
 
     #[test]
     fn nesting_and_size_are_counted_before_parsing() {
         let limits = Limits { json_depth: 3, json_values: 8, ..Limits::default() };
-        assert!(parse(b"[[[1]]]", 0, &limits).is_ok());
-        assert!(parse(b"[[[[1]]]]", 0, &limits).is_err());
-        assert!(parse(br#"["[[[[[,,,,,,,\"[[["]"#, 0, &limits).is_ok(), "brackets in strings");
-        assert!(parse(b"[1,1,1,1,1,1,1,1,1]", 0, &limits).is_err());
-        assert!(parse(&[b'['; 100_000], 0, &Limits::default()).is_err());
+        assert!(parse_within(b"[[[1]]]", &limits).is_ok());
+        assert!(parse_within(b"[[[[1]]]]", &limits).is_err());
+        assert!(parse_within(br#"["[[[[[,,,,,,,\"[[["]"#, &limits).is_ok(), "brackets in strings");
+        assert!(parse_within(b"[1,1,1,1,1,1,1,1,1]", &limits).is_err());
+        assert!(parse_within(&[b'['; 100_000], &Limits::default()).is_err());
     }
 }

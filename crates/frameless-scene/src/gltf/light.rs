@@ -9,12 +9,17 @@ use crate::{Light, LightKind};
 
 use super::error::Fault;
 use super::json::Json;
+use super::limits::{Limits, within};
 use super::node::Hierarchy;
 
 const EXTENSION: &str = "KHR_lights_punctual";
 
 /// The lights at nodes of the scene, in the order of those nodes.
-pub(super) fn load_lights(root: &Json<'_>, hierarchy: &Hierarchy) -> Result<Vec<Light>, Fault> {
+pub(super) fn load_lights(
+    root: &Json<'_>,
+    hierarchy: &Hierarchy,
+    limits: &Limits,
+) -> Result<Vec<Light>, Fault> {
     let definitions = match root.extension(EXTENSION)? {
         Some(extension) => extension.list("lights")?,
         None => Vec::new(),
@@ -25,6 +30,7 @@ pub(super) fn load_lights(root: &Json<'_>, hierarchy: &Hierarchy) -> Result<Vec<
         let Some(extension) = node.extension(EXTENSION)? else { continue };
         let light = extension.required("light")?.index(definitions.len(), "lights")?;
         if let Some(index) = hierarchy.index_of[file_index] {
+            within(lights.len() as u64 + 1, limits.lights, "lights", extension.pointer())?;
             lights.push(Light { node: index, ..definitions[light] });
         }
     }

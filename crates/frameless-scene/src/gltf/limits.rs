@@ -10,7 +10,8 @@ use super::error::{Fault, Place, Problem};
 pub struct Limits {
     /// Bytes of the scene file, and of each file that it names.
     pub file_bytes: u64,
-    /// Bytes of everything decoded together: buffers, vertices, triangles, keyframes, texels.
+    /// Bytes of everything decoded together: JSON, buffers, vertices, triangles, keyframes, texels. But for texels, a 16th part of it may be
+    /// made of nothing, and beyond that 32 times the bytes of the files: whatever a small file names over and over, it remains small.
     pub decoded_bytes: u64,
     /// Triangles of all meshes together, each mesh counted once however often it is instanced.
     pub triangles: u64,
@@ -26,11 +27,13 @@ pub struct Limits {
     pub node_depth: u64,
     /// Meshes at nodes.
     pub instances: u64,
+    /// Punctual lights at nodes: `direct` looks at every one from every point.
+    pub lights: u64,
     /// Keys of all animation channels together.
     pub keyframes: u64,
     /// Brackets around the innermost JSON value; more than 127 are refused in any case.
     pub json_depth: u64,
-    /// Values, keys included, in the JSON document; each takes up to about 100 bytes while the file is read.
+    /// Values, keys included, in the JSON document; each takes up to about 100 bytes while the file is read, or 64 of `decoded_bytes`.
     pub json_values: u64,
 }
 
@@ -47,6 +50,7 @@ impl Default for Limits {
             nodes: 1_000_000,
             node_depth: 200_000,
             instances: 1_000_000,
+            lights: 5_000,
             keyframes: 20_000_000,
             json_depth: 100,
             json_values: 20_000_000,
@@ -58,7 +62,10 @@ impl Default for Limits {
 #[derive(Debug)]
 pub(super) struct Budget {
     pub(super) limits: Limits,
+    /// Of the scene's file and those that it names.
+    file_bytes: u64,
     bytes: u64,
+    image_bytes: u64,
     void_bytes: u64,
     triangles: u64,
     vertices: u64,
@@ -73,7 +80,9 @@ impl Budget {
     pub(super) fn new(limits: &Limits) -> Budget {
         Budget {
             limits: limits.clone(),
+            file_bytes: 0,
             bytes: 0,
+            image_bytes: 0,
             void_bytes: 0,
             triangles: 0,
             vertices: 0,
@@ -84,6 +93,11 @@ impl Budget {
         }
     }
 
+    /// There is a file of so many bytes.
+    pub(super) fn add_file(&mut self, bytes: usize) {
+        self.file_bytes = self.file_bytes.saturating_add(bytes as u64);
+    }
+
     /// `count` things of `each` bytes are about to be allocated for what stands at `pointer`.
     pub(super) fn allocate(
         &mut self,
@@ -92,7 +106,23 @@ impl Budget {
         each: usize,
     ) -> Result<(), Fault> {
         let bytes = (count as u64).saturating_mul(each as u64);
-        spend(&mut self.bytes, bytes, self.limits.decoded_bytes, "decoded bytes", pointer)
+        let limit = self.limits.decoded_bytes.saturating_sub(self.image_bytes);
+        within(self.bytes.saturating_add(bytes), limit, "decoded bytes", pointer)?;
+        let (limit, what) = (self.made_limit(), "bytes made of few bytes of file");
+        spend(&mut self.bytes, bytes, limit, what, pointer)
+    }
+
+    /// What may be made of files of this size.
+    fn made_limit(&self) -> u64 {
+        /// Of what may be decoded; by default 256 MiB, or two million triangles, which take a second on two cores. Files that show a sphere in
+        /// a hundred materials have half of it.
+        const SHARE: u64 = 16;
+        /// What is compressed best (EXT_meshopt_compression, quantised to 8 bits) is made into about 20 times as much.
+        const PER_BYTE: u64 = 32;
+        let of_nothing = self.limits.decoded_bytes / SHARE;
+        // Whoever wants less than usual of all does not want less of small files.
+        let of_nothing = of_nothing.max(Limits::default().decoded_bytes / SHARE);
+        of_nothing.saturating_add(PER_BYTE.saturating_mul(self.file_bytes))
     }
 
     /// The same of an accessor without data, whose elements are zeros until a sparse one replaces some: morph targets that move little.
@@ -146,8 +176,8 @@ impl Budget {
         let thin_limit = self.limits.total_pixels / THIN_SHARE;
         spend(&mut self.thin_pixels, thin, thin_limit, "pixels in images of few bytes", pointer)?;
         spend(&mut self.pixels, pixels, self.limits.total_pixels, "pixels in all images", pointer)?;
-        let limit = self.limits.decoded_bytes;
-        spend(&mut self.bytes, image_bytes(pixels), limit, "decoded bytes", pointer)
+        let limit = self.limits.decoded_bytes.saturating_sub(self.bytes);
+        spend(&mut self.image_bytes, image_bytes(pixels), limit, "decoded bytes", pointer)
     }
 }
 
@@ -161,12 +191,20 @@ fn image_bytes(pixels: u64) -> u64 {
 pub(crate) fn check_environment_size(
     width: u32,
     height: u32,
+    encoded_bytes: usize,
     limits: &Limits,
 ) -> Result<(), Problem> {
     const BYTES_PER_TEXEL: u64 = 5 * 4;
+    /// Without compression each has four bytes, and photographs little less with it.
+    const PIXELS_PER_BYTE: u64 = 4;
+    /// Of all texels, those that may come from next to nothing: by default 8 million, a second's work.
+    const THIN_SHARE: u64 = 64;
     let pixels = u64::from(width) * u64::from(height);
     let bytes = pixels.saturating_mul(BYTES_PER_TEXEL);
+    let thin = pixels.saturating_sub(PIXELS_PER_BYTE.saturating_mul(encoded_bytes as u64));
+    let thin_limit = limits.total_pixels / THIN_SHARE;
     within(pixels, limits.image_pixels, "pixels in one image", "")
+        .and_then(|()| within(thin, thin_limit, "pixels in images of few bytes", ""))
         .and_then(|()| within(bytes, limits.decoded_bytes, "decoded bytes", ""))
         .map_err(|fault| fault.problem)
 }
@@ -175,6 +213,7 @@ pub(crate) fn check_environment_size(
 pub(super) fn flag_of(what: &str) -> Option<&'static str> {
     Some(match what {
         "decoded bytes"
+        | "bytes made of few bytes of file"
         | "bytes of zeros without data"
         | "bytes of file"
         | "keyframes"
@@ -186,6 +225,7 @@ pub(super) fn flag_of(what: &str) -> Option<&'static str> {
         "nodes" => "--max-nodes",
         "levels of nodes" => "--max-nesting",
         "instances" => "--max-instances",
+        "lights" => "--max-lights",
         _ => return None,
     })
 }

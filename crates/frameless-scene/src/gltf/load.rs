@@ -3,9 +3,9 @@
 use std::fs::File;
 use std::path::Path;
 
-use crate::{Contents, Geometry, Material, Scene, State, Target, Value};
+use crate::{Camera, Contents, Geometry, Material, Node, Scene, Skin, State, Target, Value};
 
-use super::accessor::parse_accessors;
+use super::accessor::{Accessor, parse_accessors};
 use super::animation::{Nodes, load_animation};
 use super::buffers::{load_buffers, parse_views};
 use super::camera::load_cameras;
@@ -88,9 +88,11 @@ fn from_bytes(
     within(bytes.len() as u64, limits.file_bytes, "bytes of file", "")?;
     let mut warnings = Warnings::default();
     let mut budget = Budget::new(limits);
+    budget.add_file(bytes.len());
     let container = Container::split(bytes, &mut warnings)?;
-    let value = parse(container.json, container.json_offset, limits)?;
+    let value = parse(container.json, container.json_offset, &mut budget)?;
     let root = Json::root(&value);
+    charge_for_lists(&root, &mut budget)?;
     check_version(&root)?;
     check_extensions(&root, &value, &mut warnings)?;
     let buffers = load_buffers(&root, container.bin, folder, &mut budget, &mut warnings)?;
@@ -102,6 +104,31 @@ fn from_bytes(
     name.clone_into(&mut scene.name);
     finish(&mut scene, document.warnings);
     Ok(scene)
+}
+
+/// What an empty element of each list is made into at least: files of three bytes for each could fill the memory otherwise.
+fn charge_for_lists(root: &Json<'_>, budget: &mut Budget) -> Result<(), Fault> {
+    /// JSON pointer and the like.
+    const WORDS: usize = 64;
+    for (list, bytes) in [
+        ("accessors", size_of::<Accessor<'_>>() + WORDS),
+        ("animations", 2 * WORDS),
+        ("buffers", WORDS),
+        ("bufferViews", 2 * WORDS),
+        ("cameras", size_of::<Camera>() + WORDS),
+        ("images", 3 * WORDS),
+        ("materials", size_of::<Material>() + WORDS),
+        ("meshes", size_of::<Geometry>() + WORDS),
+        // At rest, in the world, and what hangs below it.
+        ("nodes", size_of::<Node>() + 3 * WORDS),
+        ("samplers", WORDS),
+        ("scenes", WORDS),
+        ("skins", size_of::<Skin>() + WORDS),
+        ("textures", WORDS),
+    ] {
+        budget.allocate(&format!("/{list}"), root.count(list), bytes)?;
+    }
+    Ok(())
 }
 
 fn check_version(root: &Json<'_>) -> Result<(), Fault> {
@@ -131,12 +158,13 @@ fn build(document: &mut Document<'_>, choice: &Choice) -> Result<Scene, Fault> {
         Scene { materials: load_materials(document, &mut textures)?, ..Scene::default() };
     scene.images = textures.decode(document);
     scene.textures = textures.textures;
-    scene.geometries = load_meshes(document, &scene.materials)?;
+    let meshes = load_meshes(document, &scene.materials)?;
+    scene.geometries = meshes.geometries;
     add_default_material(&mut scene);
     let skins = load_skins(document, &hierarchy)?;
-    let weights_of = place_instances(&mut scene, document, &mut hierarchy, skins)?;
+    let weights_of = place_instances(&mut scene, document, &mut hierarchy, skins, meshes.same_as)?;
     scene.cameras = load_cameras(&root, &hierarchy)?;
-    scene.lights = load_lights(&root, &hierarchy)?;
+    scene.lights = load_lights(&root, &hierarchy, &limits)?;
     scene.contents = load_contents(&root, &hierarchy)?;
     let nodes = Nodes { hierarchy: &hierarchy, weights_of: &weights_of };
     scene.animation = load_animation(document, &nodes, &choice.animation, &mut scene.contents)?;
@@ -153,7 +181,7 @@ fn build(document: &mut Document<'_>, choice: &Choice) -> Result<Scene, Fault> {
 fn add_default_material(scene: &mut Scene) {
     let beyond = scene.materials.len() as u32;
     let is_needed = scene.geometries.iter().any(|geometry| match geometry {
-        Geometry::Mesh(mesh) => mesh.triangle_materials.contains(&beyond),
+        Geometry::Mesh(mesh) => mesh.triangle_materials.used().any(|material| material == beyond),
         Geometry::Sphere { .. } => false,
     });
     if is_needed {

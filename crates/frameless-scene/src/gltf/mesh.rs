@@ -8,6 +8,7 @@ use glam::{Vec2, Vec3, Vec4};
 use crate::{Geometry, Material, Mesh, MorphTarget, TextureRef, UV_SETS};
 
 use super::attributes::{Attributes, Vertices};
+use super::coincident::leave_out_coincident;
 use super::document::Document;
 use super::error::Fault;
 use super::influences::{append_influences, settle_influences};
@@ -15,32 +16,52 @@ use super::json::Json;
 use super::normals::{flatten, repair};
 use super::tangents;
 use super::topology::Topology;
+use super::twins::most_in_one_place;
 
-/// All meshes of the file, in its order; those without triangles are empty.
-///
-/// Triangles of primitives without a material get `materials.len()`.
+/// All meshes of the file, in its order.
+pub(super) struct Meshes {
+    /// Those without triangles are empty, and so are those that are the same as others.
+    pub(super) geometries: Vec<Geometry>,
+    /// Per mesh: the first that is made of the same accessors in the same way, which is perhaps itself.
+    pub(super) same_as: Vec<usize>,
+}
+
+/// Reads them. Triangles of primitives without a material get `materials.len()`.
 pub(super) fn load_meshes(
     document: &mut Document<'_>,
     materials: &[Material],
-) -> Result<Vec<Geometry>, Fault> {
-    let meshes = document.root.list("meshes")?;
-    meshes.iter().map(|json| load_mesh(json, document, materials)).collect()
+) -> Result<Meshes, Fault> {
+    let (mut geometries, mut same_as) = (Vec::new(), Vec::new());
+    let mut known: HashMap<Vec<Made>, usize> = HashMap::new();
+    for (index, json) in document.root.list("meshes")?.iter().enumerate() {
+        let primitives = json.required("primitives")?.elements()?;
+        let primitives = primitives.iter().map(|json| Primitive::parse(json, document, materials));
+        let primitives = primitives.collect::<Result<Vec<_>, Fault>>()?;
+        refuse_other_target_counts(&primitives)?;
+        for primitive in &primitives {
+            warn_of_what_is_left_out(primitive, json, document, materials);
+        }
+        let made = primitives.iter().map(Primitive::made).collect();
+        let first = *known.entry(made).or_insert(index);
+        same_as.push(first);
+        geometries.push(Geometry::Mesh(match first == index {
+            true => load_mesh(json, &primitives, document, materials)?,
+            false => Mesh::default(),
+        }));
+    }
+    Ok(Meshes { geometries, same_as })
 }
 
 fn load_mesh(
     json: &Json<'_>,
+    primitives: &[Primitive<'_>],
     document: &mut Document<'_>,
     materials: &[Material],
-) -> Result<Geometry, Fault> {
-    let primitives = json.required("primitives")?.elements()?;
-    let primitives = primitives.iter().map(|json| Primitive::parse(json, document, materials));
-    let primitives = primitives.collect::<Result<Vec<_>, Fault>>()?;
-    refuse_other_target_counts(&primitives)?;
+) -> Result<Mesh, Fault> {
     let shaded_smoothly = primitives.iter().any(|primitive| primitive.attributes.normal.is_some());
     let mut joiner =
         Joiner { json, shaded_smoothly, mesh: Mesh::default(), shared: HashMap::new() };
-    for primitive in &primitives {
-        warn_of_what_is_left_out(primitive, json, document, materials);
+    for primitive in primitives {
         if primitive.attributes.position.is_some() && primitive.topology.is_some() {
             joiner.add(primitive, document)?;
         }
@@ -48,7 +69,15 @@ fn load_mesh(
     let mut mesh = joiner.mesh;
     settle_influences(&mut mesh, json, document);
     drop_useless_displacements(&mut mesh);
-    Ok(Geometry::Mesh(mesh))
+    let veils = |material: u32| match materials.get(material as usize) {
+        Some(material) => most_in_one_place(material) as usize,
+        None => 1,
+    };
+    if leave_out_coincident(&mut mesh, veils) > 0 {
+        let what = "triangles that are there already were left out";
+        document.warnings.about(what, json.called("mesh"));
+    }
+    Ok(mesh)
 }
 
 /// All primitives of a mesh have the same morph targets (glTF 2.0 §3.7.2.2).
@@ -76,6 +105,9 @@ fn drop_useless_displacements(mesh: &mut Mesh) {
         }
     }
 }
+
+/// All that the vertices and triangles of a primitive depend on: accessors, indices, order and material.
+type Made = (Attributes, Option<usize>, Option<Topology>, u32);
 
 /// A primitive whose references are known to lead somewhere.
 struct Primitive<'a> {
@@ -118,6 +150,13 @@ impl<'a> Primitive<'a> {
             material,
             material_slot: material.unwrap_or(materials.len()) as u32,
         })
+    }
+}
+
+impl Primitive<'_> {
+    fn made(&self) -> Made {
+        let indices = self.indices.as_ref().map(|(accessor, _)| *accessor);
+        (self.attributes.clone(), indices, self.topology, self.material_slot)
     }
 }
 
@@ -289,6 +328,9 @@ impl Joiner<'_> {
 /// Position, normal, texture coordinates, colour.
 const BYTES_PER_VERTEX: usize = 12 + 12 + UV_SETS * 8 + 16;
 
+/// Itself, what is made of it for rays (about 36), and as many again for the time that this takes: a microsecond.
+const BYTES_PER_TRIANGLE: usize = 128;
+
 /// Appends `more` to `values`. The first of them stay where they are: of a large mesh there may be no room for both.
 fn append<T>(values: &mut Vec<T>, more: Vec<T>) {
     if values.is_empty() {
@@ -333,11 +375,16 @@ fn read_triangles(
             Order::checked(indices, vertices, json)?
         }
     };
-    let count = topology.triangle_count(order.len());
-    let pointer = primitive.json.pointer();
+    let all = 0..topology.triangle_count(order.len());
+    let all = all.map(|i| topology.corners(i).map(|corner| order.vertex(corner)));
+    // As strips have them where they turn; no ray hits them, in whatever pose.
+    let triangles = all.filter(|[a, b, c]| a != b && b != c && c != a);
+    let (count, pointer) = (triangles.clone().count(), primitive.json.pointer());
     document.budget.add_triangles(pointer, count)?;
-    document.budget.allocate(pointer, count, size_of::<[u32; 4]>())?;
-    Ok((0..count).map(|i| topology.corners(i).map(|corner| order.vertex(corner))).collect())
+    document.budget.allocate(pointer, count, BYTES_PER_TRIANGLE)?;
+    let mut read = Vec::with_capacity(count);
+    read.extend(triangles);
+    Ok(read)
 }
 
 /// In which order vertices make triangles.

@@ -22,6 +22,7 @@ mod attributes;
 mod buffers;
 mod camera;
 mod choice;
+mod coincident;
 mod compressed;
 mod container;
 mod defaults;
@@ -48,6 +49,7 @@ mod texture;
 mod topology;
 mod twins;
 mod uri;
+mod value;
 mod warnings;
 
 pub use choice::{AnimationChoice, Choice, Pick};

@@ -5,8 +5,8 @@ use glam::{Mat3, Mat4, Quat, Vec3, Vec4};
 use crate::{Node, Transform};
 
 use super::choice::Pick;
-use super::error::{Fault, quoted};
-use super::json::Json;
+use super::error::Fault;
+use super::json::{Json, called};
 use super::limits::{Limits, within};
 use super::warnings::Warnings;
 
@@ -236,10 +236,6 @@ fn rotation_axes(linear: &Mat3, length: Vec3) -> Mat3 {
 
 /// How a message calls node `index` of a hierarchy.
 pub(super) fn node_called(hierarchy: &Hierarchy, index: usize) -> String {
-    let name = &hierarchy.nodes[index].name;
-    if name.is_empty() {
-        format!("/nodes/{}", hierarchy.file_index[index])
-    } else {
-        format!("node {}", quoted(name))
-    }
+    let pointer = format!("/nodes/{}", hierarchy.file_index[index]);
+    called("node", &hierarchy.nodes[index].name, &pointer)
 }

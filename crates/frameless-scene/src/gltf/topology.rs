@@ -4,7 +4,7 @@ use super::error::Fault;
 use super::json::Json;
 
 /// How vertices make triangles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Topology {
     /// Three vertices each: { v₃ᵢ, v₃ᵢ₊₁, v₃ᵢ₊₂ }.
     Triangles,

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-use crate::{AlphaMode, Geometry, Scene, State, Target};
+use crate::{AlphaMode, Geometry, Material, Scene, State, Target};
 
 use super::warnings::Warnings;
 
@@ -76,16 +76,18 @@ fn look<'a>(
 
 /// Per geometry: how many of it are seen in one place.
 fn most_of_each(scene: &Scene) -> Vec<u32> {
-    let lets_pass = |&material: &u32| {
-        let material = &scene.materials[material as usize];
-        let is_clear = material.layers.as_ref().is_some_and(|layers| layers.transmission > 0.0);
-        is_clear || material.alpha_mode == AlphaMode::Blend
-    };
+    let of_material = |material: u32| most_in_one_place(&scene.materials[material as usize]);
     let most = |geometry: &Geometry| match geometry {
-        Geometry::Mesh(mesh) if mesh.triangle_materials.iter().any(lets_pass) => MOST_VEILS,
-        _ => 1,
+        Geometry::Mesh(mesh) => mesh.triangle_materials.used().map(of_material).max().unwrap_or(1),
+        Geometry::Sphere { .. } => 1,
     };
     scene.geometries.iter().map(most).collect()
+}
+
+/// How many surfaces of a material are seen in one place.
+pub(super) fn most_in_one_place(material: &Material) -> u32 {
+    let is_clear = material.layers.as_ref().is_some_and(|layers| layers.transmission > 0.0);
+    if is_clear || material.alpha_mode == AlphaMode::Blend { MOST_VEILS } else { 1 }
 }
 
 /// What the animation leaves alone.

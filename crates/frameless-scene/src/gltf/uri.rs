@@ -21,6 +21,8 @@ use super::limits::{Budget, within};
 pub(super) enum Uri<'a> {
     /// Base64 text of a `data:` URI.
     Data(&'a str),
+    /// Text of a `data:` URI that is bytes as they are, some of them percent-encoded.
+    Plain(&'a str),
     /// A path below the scene file's folder.
     Relative(PathBuf),
 }
@@ -29,10 +31,12 @@ impl<'a> Uri<'a> {
     pub(super) fn parse(json: &Json<'a>) -> Result<Uri<'a>, Fault> {
         let text = json.text()?;
         if let Some(data) = text.strip_prefix("data:") {
-            let payload = data.split_once(',').filter(|(header, _)| is_base64_header(header));
-            return payload
-                .map(|(_, payload)| Uri::Data(payload))
-                .ok_or_else(|| json.fault("data:<media type>;base64,<text>"));
+            let payload = data.split_once(',');
+            let uri = payload.and_then(|(header, payload)| match header.strip_suffix(";base64") {
+                Some(media_type) => is_media_type(media_type).then_some(Uri::Data(payload)),
+                None => is_media_type(header).then_some(Uri::Plain(payload)),
+            });
+            return uri.ok_or_else(|| json.fault("data:<media type>;base64,<text>"));
         }
         relative_path(text)
             .map(Uri::Relative)
@@ -48,6 +52,10 @@ impl<'a> Uri<'a> {
     ) -> Result<Vec<u8>, Fault> {
         match self {
             Uri::Data(text) => decode_base64(text, pointer, budget),
+            Uri::Plain(text) => {
+                budget.allocate(pointer, text.len(), 1)?;
+                Ok(percent_decode_str(text).collect())
+            }
             Uri::Relative(path) => {
                 let Some(folder) = folder else {
                     return Err(Fault::at(
@@ -64,10 +72,11 @@ impl<'a> Uri<'a> {
     }
 }
 
-/// `[type/subtype](;attribute=value)*;base64` (RFC 2397 §2).
-fn is_base64_header(header: &str) -> bool {
-    let Some(media_type) = header.strip_suffix(";base64") else { return false };
-    media_type.split(';').skip(1).all(|parameter| parameter.contains('='))
+/// `[type/subtype](;attribute=value)*` (RFC 2397 §2).
+fn is_media_type(text: &str) -> bool {
+    let mut parts = text.split(';');
+    let kind = parts.next().unwrap_or_default();
+    (kind.is_empty() || kind.contains('/')) && parts.all(|parameter| parameter.contains('='))
 }
 
 /// The percent-decoded path, if every step of it leads downwards.
@@ -114,6 +123,7 @@ pub(super) fn read_file(file: File, pointer: &str, budget: &mut Budget) -> Resul
     let limit = budget.limits.file_bytes;
     let bytes = file.metadata().map_err(failed)?.len();
     within(bytes, limit, "bytes of file", pointer)?;
+    budget.add_file(bytes as usize);
     budget.allocate(pointer, bytes as usize, 1)?;
     let mut content = Vec::with_capacity(bytes as usize);
     // The file may grow while it is read: what it was is what counts.
@@ -152,11 +162,11 @@ mod tests {
 
     #[test]
     fn data_uri_headers() {
-        for header in [";base64", "image/png;base64", "text/plain;charset=utf-8;base64"] {
-            assert!(is_base64_header(header), "{header}");
+        for header in ["", "image/png", "text/plain;charset=utf-8", ";charset=US-ASCII"] {
+            assert!(is_media_type(header), "{header}");
         }
-        for header in ["", "image/png", "base64", "application/octet-stream;;base64"] {
-            assert!(!is_base64_header(header), "{header}");
+        for header in ["base64", "application/octet-stream;", "a/b;base64;"] {
+            assert!(!is_media_type(header), "{header}");
         }
     }
 }

@@ -246,7 +246,7 @@ fn what_is_no_gltf_is_told_by_its_first_byte() {
 #[test]
 fn every_limit_is_held() {
     type Lower = fn(&mut Limits);
-    let lower: [(&str, &str, Lower); 12] = [
+    let lower: [(&str, &str, Lower); 13] = [
         ("bytes of file", "--max-memory", |limits| limits.file_bytes = 100),
         ("decoded bytes", "--max-memory", |limits| limits.decoded_bytes = 100),
         ("triangles", "--max-triangles", |limits| limits.triangles = 1),
@@ -254,6 +254,7 @@ fn every_limit_is_held() {
         ("nodes", "--max-nodes", |limits| limits.nodes = 2),
         ("levels of nodes", "--max-nesting", |limits| limits.node_depth = 1),
         ("instances", "--max-instances", |limits| limits.instances = 0),
+        ("lights", "--max-lights", |limits| limits.lights = 0),
         ("keyframes", "--max-memory", |limits| limits.keyframes = 3),
         ("levels of JSON nesting", "", |limits| limits.json_depth = 4),
         ("JSON values", "--max-memory", |limits| limits.json_values = 100),

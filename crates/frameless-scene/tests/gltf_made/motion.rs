@@ -116,7 +116,9 @@ fn animations_play_together_or_the_first_alone() {
     let scene = maker.load();
     assert_eq!(driven(&scene), [Target::Translation(0)], "the first and the last compete");
     assert_eq!(scene.animation.duration_secs, 1.0, "that of what is played");
-    assert!(scene.warnings[0].contains("only animation \"an animation\" is played"));
+    assert!(
+        scene.warnings[0].contains("only animation \"an animation\" (/animations/0) is played")
+    );
     assert_eq!(scene.animation.channels[0].interpolation, Interpolation::Linear);
 }
 
