@@ -113,13 +113,13 @@ impl Emitters {
             if scene.deformation_of(instance).is_some() {
                 continue;
             }
-            let radiance = |primitive: usize| {
-                let material = mesh.triangle_materials.get(primitive);
-                material.and_then(|&m| means.get(m as usize)).copied().unwrap_or(Vec3::ZERO)
-            };
-            if (0..mesh.triangles.len()).all(|primitive| radiance(primitive) == Vec3::ZERO) {
+            let of = |material: u32| means.get(material as usize).copied().unwrap_or(Vec3::ZERO);
+            if mesh.triangle_materials.used().all(|material| of(material) == Vec3::ZERO) {
                 continue;
             }
+            let radiance = |primitive: usize| {
+                mesh.triangle_materials.get(primitive).map_or(Vec3::ZERO, |&material| of(material))
+            };
             first_of[instance] = Some(number_of.len() as u32);
             for primitive in 0..mesh.triangles.len() {
                 let (radiance, [a, b, c]) = (radiance(primitive), corners(mesh, primitive as u32));

@@ -13,6 +13,7 @@ mod cast;
 mod collapse;
 mod cpu;
 mod crew;
+mod crowd;
 mod deforming;
 mod direct;
 mod emitters;

@@ -113,6 +113,10 @@ impl Standing {
         Some(Standing { tree, numbers, places })
     }
 
+    pub(crate) fn tree(&self) -> &Blas {
+        &self.tree
+    }
+
     /// Where an instance of the tree stands.
     #[inline]
     pub(crate) fn place(&self, instance: usize) -> Option<&Affine3A> {

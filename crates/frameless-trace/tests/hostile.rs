@@ -9,8 +9,8 @@ use frameless_scene::{Limits, LoadError, load_bytes};
 use frameless_trace::{Integrator, Settings, ViewSource, World, render, thread_pool};
 use serde_json::{Value, json};
 
-/// Two seconds in the release profile; without optimisation on two busy cores:
-const LONGEST: Duration = Duration::from_secs(60);
+/// With assertions and overflow checks, as tests are built, everything takes up to six times as long.
+const LONGEST: Duration = Duration::from_secs(if cfg!(debug_assertions) { 12 } else { 2 });
 const F32: u32 = 5126;
 const U32: u32 = 5125;
 
@@ -151,6 +151,15 @@ fn keyframes_of_any_value_are_drawn() {
     }
 }
 
+/// In one line, which names the flag that lets it pass.
+#[track_caller]
+fn is_refused(what: &str, file: &(Value, Vec<u8>), flag: &str) {
+    let begin = Instant::now();
+    let refusal = survives(what, file).expect_err("more than a small file may ask for");
+    assert!(begin.elapsed() < LONGEST, "{what}: {:?}", begin.elapsed());
+    assert!(refusal.to_string().contains(flag), "{what}: {refusal}");
+}
+
 /// The triangle where an accessor says, which has no data: zeros.
 fn instances(count: u32) -> (Value, Vec<u8>) {
     let (mut document, bin) = triangle();
@@ -175,8 +184,9 @@ fn half_a_billion_instances_are_refused_and_a_hundred_thousand_in_one_place_are_
 #[test]
 fn three_hundred_thousand_triangles_in_one_place_are_drawn() {
     let (mut document, bin) = triangle();
-    let zeros = json!({"componentType": U32, "type": "SCALAR", "count": 900_000});
-    document["meshes"][0]["primitives"][0]["indices"] =
+    // With vertices of their own, as triangles with a vertex twice are dropped.
+    let zeros = json!({"componentType": F32, "type": "VEC3", "count": 900_000});
+    document["meshes"][0]["primitives"][0]["attributes"]["POSITION"] =
         json!(push(&mut document, "accessors", zeros));
     is_drawn("points", &(document, bin));
 }
@@ -194,4 +204,124 @@ fn fifty_thousand_triangles_in_a_row_are_drawn() {
     let row = add_numbers(&mut document, &mut bin, "VEC3", &corners);
     document["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = json!(row);
     is_drawn("a row", &(document, bin));
+}
+
+/// Every other triangle of a strip that turns is one of these; a file may have nothing else.
+#[test]
+fn six_million_triangles_with_all_corners_in_one_are_nothing() {
+    let (mut document, bin) = triangle();
+    let zeros = json!({"componentType": U32, "type": "SCALAR", "count": 6_000_000});
+    let primitive = &mut document["meshes"][0]["primitives"][0];
+    primitive["mode"] = json!(5);
+    document["meshes"][0]["primitives"][0]["indices"] =
+        json!(push(&mut document, "accessors", zeros));
+    is_drawn("a strip of zeros", &(document, bin));
+}
+
+/// The triangle so many times, by indices of one byte.
+fn repeated(count: usize) -> (Value, Vec<u8>) {
+    let (mut document, mut bin) = triangle();
+    let view = json!({"buffer": 0, "byteOffset": bin.len(), "byteLength": 3 * count});
+    bin.extend([0, 1, 2].repeat(count));
+    document["buffers"][0]["byteLength"] = json!(bin.len());
+    let view = push(&mut document, "bufferViews", view);
+    let indices =
+        json!({"bufferView": view, "componentType": 5121, "type": "SCALAR", "count": 3 * count});
+    document["meshes"][0]["primitives"][0]["indices"] =
+        json!(push(&mut document, "accessors", indices));
+    (document, bin)
+}
+
+#[test]
+fn a_million_times_the_same_triangle_is_one() {
+    is_drawn("one triangle a million times", &repeated(1_000_000));
+    let (mut document, bin) = triangle();
+    let primitive = document["meshes"][0]["primitives"][0].clone();
+    document["meshes"][0]["primitives"] = json!(vec![primitive; 50_000]);
+    is_drawn("one triangle in 50,000 primitives", &(document, bin));
+}
+
+/// Vertices at random: no two triangles alike, each as large as all of them.
+fn soup(triangles: usize) -> (Value, Vec<u8>) {
+    let (mut document, mut bin) = triangle();
+    let mut word = 1u32;
+    let mut number = || {
+        word = word.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (word >> 8) as f32 / 16_777_216.0
+    };
+    let corners: Vec<f32> = (0..9 * triangles).map(|_| number()).collect();
+    let places = add_numbers(&mut document, &mut bin, "VEC3", &corners);
+    document["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = json!(places);
+    (document, bin)
+}
+
+#[test]
+fn a_mesh_that_stands_in_the_file_900_times_is_read_once() {
+    let (mut document, bin) = soup(10_000);
+    let mesh = document["meshes"][0].clone();
+    document["meshes"] = json!(vec![mesh; 900]);
+    document["nodes"] = (0..900).map(|mesh| json!({"mesh": mesh})).collect();
+    document["scenes"][0]["nodes"] = json!((0..900).collect::<Vec<_>>());
+    is_drawn("900 meshes", &(document.clone(), bin.clone()));
+    // The same accessors, but no two meshes are the same.
+    document["materials"] = json!(vec![json!({}); 900]);
+    for mesh in 0..900 {
+        document["meshes"][mesh]["primitives"][0]["material"] = json!(mesh);
+    }
+    is_refused("900 materials", &(document, bin), "--max-memory");
+}
+
+#[test]
+fn morph_targets_and_joints_are_counted_for_every_node() {
+    let (mut document, bin) = triangle();
+    document["meshes"][0]["primitives"][0]["targets"] = json!(vec![json!({"POSITION": 0}); 65_535]);
+    document["meshes"][0]["weights"] = json!(vec![1e-3; 65_535]);
+    document["nodes"] = (0..2_000).map(|x| json!({"mesh": 0, "translation": [x, 0, 0]})).collect();
+    document["scenes"][0]["nodes"] = json!((0..2_000).collect::<Vec<_>>());
+    is_refused("targets", &(document, bin), "--max-memory");
+
+    let (mut document, mut bin) = triangle();
+    let weights = add_numbers(&mut document, &mut bin, "VEC4", &[1.0, 0.0, 0.0, 0.0].repeat(3));
+    let joints = json!({"componentType": 5121, "type": "VEC4", "count": 3});
+    let joints = push(&mut document, "accessors", joints);
+    let attributes = json!({"POSITION": 0, "JOINTS_0": joints, "WEIGHTS_0": weights});
+    document["meshes"][0]["primitives"][0]["attributes"] = attributes;
+    document["skins"] = json!([{"joints": vec![2_000; 2_000]}]);
+    let nodes = (0..2_000).map(|_| json!({"mesh": 0, "skin": 0}));
+    document["nodes"] = nodes.chain([json!({})]).collect();
+    document["scenes"][0]["nodes"] = json!((0..=2_000).collect::<Vec<_>>());
+    is_refused("joints", &(document, bin), "--max-memory");
+}
+
+#[test]
+fn millions_of_things_of_three_bytes_are_refused() {
+    for list in ["materials", "images", "textures", "samplers", "extras"] {
+        let (mut document, bin) = triangle();
+        document[list] = json!(vec![json!({}); 4_000_000]);
+        match list {
+            // Which nobody reads: the JSON alone is kept, for a moment.
+            "extras" => is_drawn(list, &(document, bin)),
+            _ => is_refused(list, &(document, bin), "--max-memory"),
+        }
+    }
+}
+
+#[test]
+fn twenty_thousand_lights_are_refused_and_five_thousand_are_drawn() {
+    for (count, is_allowed) in [(20_000, false), (5_000, true)] {
+        let (mut document, bin) = triangle();
+        document["extensions"] =
+            json!({"KHR_lights_punctual": {"lights": [{"type": "point", "range": 10}]}});
+        let light = |k: usize| {
+            json!({"translation": [0, 0, 1e-3 * k as f64],
+                "extensions": {"KHR_lights_punctual": {"light": 0}}})
+        };
+        document["nodes"] =
+            std::iter::once(json!({"mesh": 0})).chain((0..count).map(light)).collect();
+        document["scenes"][0]["nodes"] = json!((0..=count).collect::<Vec<_>>());
+        match is_allowed {
+            true => is_drawn("lights", &(document, bin)),
+            false => is_refused("lights", &(document, bin), "--max-lights"),
+        }
+    }
 }

@@ -154,13 +154,25 @@ impl<'a> Accessor<'a> {
 
     /// The elements as unsigned numbers, as primitives index vertices.
     pub(super) fn indices(&self, budget: &mut Budget) -> Result<Vec<u32>, Fault> {
+        self.refuse_as_indices()?;
+        self.elements(budget, |bytes| self.component.whole(bytes))
+    }
+
+    /// The highest of them, if they are all stored as they are: neither zeros nor sparse.
+    pub(super) fn highest_stored_index(&self) -> Result<Option<u32>, Fault> {
+        self.refuse_as_indices()?;
+        let Some(dense) = self.dense.filter(|_| self.sparse.is_none()) else { return Ok(None) };
+        Ok((0..self.count).map(|i| self.component.whole(dense.element(i))).max())
+    }
+
+    fn refuse_as_indices(&self) -> Result<(), Fault> {
         let component = self.component;
         let unsigned = matches!(component, Component::U8 | Component::U16 | Component::U32);
-        if self.width != 1 || !unsigned {
-            let came = format!("{} × {component:?}", self.width);
-            return Err(Fault::at(&self.pointer, "unsigned scalars as indices", came));
+        if self.width == 1 && unsigned {
+            return Ok(());
         }
-        self.elements(budget, |bytes| component.whole(bytes))
+        let came = format!("{} × {component:?}", self.width);
+        Err(Fault::at(&self.pointer, "unsigned scalars as indices", came))
     }
 
     /// The elements as four joint numbers each.

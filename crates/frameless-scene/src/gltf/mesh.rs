@@ -371,8 +371,12 @@ fn read_triangles(
     let order = match &primitive.indices {
         None => Order::Sequence(vertices),
         Some((accessor, json)) => {
-            let indices = document.accessors[*accessor].indices(&mut document.budget)?;
-            Order::checked(indices, vertices, json)?
+            let accessor = &document.accessors[*accessor];
+            // Before there is room for them, if it can be: a file may have millions.
+            refuse_beyond(vertices, accessor.highest_stored_index()?, json)?;
+            let indices = accessor.indices(&mut document.budget)?;
+            refuse_beyond(vertices, indices.iter().copied().max(), json)?;
+            Order::Indices(indices)
         }
     };
     let all = 0..topology.triangle_count(order.len());
@@ -395,17 +399,18 @@ enum Order {
     Indices(Vec<u32>),
 }
 
-impl Order {
-    fn checked(indices: Vec<u32>, vertices: usize, json: &Json<'_>) -> Result<Order, Fault> {
-        match indices.iter().find(|&&index| index as usize >= vertices) {
-            None => Ok(Order::Indices(indices)),
-            Some(index) => {
-                let wanted = format!("indices below the number of vertices, {vertices}");
-                Err(Fault::at(json.pointer(), wanted, index))
-            }
+/// Refuses indices up to `highest` of fewer vertices.
+fn refuse_beyond(vertices: usize, highest: Option<u32>, json: &Json<'_>) -> Result<(), Fault> {
+    match highest {
+        Some(index) if index as usize >= vertices => {
+            let wanted = format!("indices below the number of vertices, {vertices}");
+            Err(Fault::at(json.pointer(), wanted, index))
         }
+        _ => Ok(()),
     }
+}
 
+impl Order {
     fn len(&self) -> usize {
         match self {
             Order::Sequence(count) => *count,
