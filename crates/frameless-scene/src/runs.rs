@@ -1,10 +1,11 @@
 //! Which material each triangle of a mesh has. Files give one to whole primitives, so that a number for each triangle would be four bytes
 //! of a million that say the same.
 
+use std::fmt;
 use std::ops::Index;
 
 /// A material's index per triangle, stored once for every run of triangles that have the same.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Default, PartialEq, Eq)]
 pub struct TriangleMaterials {
     /// None of them empty, neighbours of different materials.
     runs: Vec<Run>,
@@ -96,6 +97,13 @@ impl Index<usize> for TriangleMaterials {
     }
 }
 
+/// As the array that it stands for: what knows a scene by its text knows it still.
+impl fmt::Debug for TriangleMaterials {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries(self.iter()).finish()
+    }
+}
+
 impl FromIterator<u32> for TriangleMaterials {
     fn from_iter<I: IntoIterator<Item = u32>>(materials: I) -> TriangleMaterials {
         let mut all = TriangleMaterials::default();
@@ -117,6 +125,7 @@ mod tests {
         assert!(materials.iter().eq(list));
         assert!((0..list.len()).all(|k| materials[k] == list[k]));
         assert!(materials.used().eq([3, 0, 7, 3]));
+        assert_eq!(format!("{materials:?}"), format!("{list:?}"));
         assert_eq!((materials.len(), materials.get(6), materials.get(7)), (7, Some(&3), None));
     }
 

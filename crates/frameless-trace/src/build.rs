@@ -58,7 +58,10 @@ impl Blas {
             nodes.push(Node::EMPTY);
         }
         leaves.extend([0; LONGEST]);
-        nodes.shrink_to_fit();
+        // What is aligned as nodes are is copied for that, beside all that there is: not for the last bytes, which nobody has touched.
+        if nodes.capacity() > 2 * nodes.len() {
+            nodes.shrink_to_fit();
+        }
         leaves.shrink_to_fit();
         prefer_large_pages(&nodes);
         prefer_large_pages(&leaves);
@@ -94,6 +97,20 @@ pub(crate) struct Tree {
     pub(crate) nodes: Vec<Node>,
     pub(crate) leaves: Vec<u32>,
     pub(crate) roots: Vec<Root>,
+}
+
+impl Tree {
+    /// For what most trees take: an array that grows leaves behind what it was.
+    fn with_room_for(triangles: usize) -> Tree {
+        /// Leaves take about six words per triangle.
+        const WORDS: usize = 7;
+        const TRIANGLES_PER_NODE: usize = 12;
+        Tree {
+            nodes: Vec::with_capacity(triangles / TRIANGLES_PER_NODE),
+            leaves: Vec::with_capacity(WORDS * triangles),
+            roots: Vec::new(),
+        }
+    }
 }
 
 /// Where a tree begins.
@@ -135,7 +152,7 @@ pub(crate) fn build(
         |triangle: [Corner; 3]| Aabb::from_points(&triangle.map(|corner| Vec3A::from(corner.at)));
     let boxes: Vec<Aabb> = (0..members.len() as u32).map(|m| around(corners(m))).collect();
     let make = |binary: &Bvh2| {
-        let (mut tree, mut collapse) = (Tree::default(), Collapse::default());
+        let (mut tree, mut collapse) = (Tree::with_room_for(members.len()), Collapse::default());
         let Tree { nodes, leaves, .. } = &mut tree;
         collapse.plan(binary, LEAF_COST, |boxes| fits(corners, boxes));
         let mut make_leaf = |boxes: &[u32]| {

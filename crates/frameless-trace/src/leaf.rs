@@ -43,18 +43,13 @@ pub(crate) fn vertices(triangles: &[[Name; 3]]) -> usize {
 /// If it has more triangles or vertices than there may be.
 pub(crate) fn write(words: &mut Vec<u32>, triangles: &[(u32, [Corner; 3])]) -> usize {
     assert!((1..=MOST_TRIANGLES).contains(&triangles.len()), "{} triangles", triangles.len());
-    let mut vertices: Vec<Corner> = Vec::with_capacity(MOST_VERTICES);
+    let mut vertices = Distinct { corners: [triangles[0].1[0]; 3 * MOST_TRIANGLES], count: 0 };
     let mut corners = [[0u32; 3]; MOST_TRIANGLES];
     for (lane, corners) in corners.iter_mut().enumerate() {
         let (_, triangle) = &triangles[lane.min(triangles.len() - 1)];
-        *corners = triangle.map(|corner| {
-            let known = vertices.iter().position(|vertex| vertex.name == corner.name);
-            known.unwrap_or_else(|| {
-                vertices.push(corner);
-                vertices.len() - 1
-            }) as u32
-        });
+        *corners = triangle.map(|corner| vertices.place_of(corner) as u32);
     }
+    let vertices = &vertices.corners[..vertices.count];
     assert!(vertices.len() <= MOST_VERTICES, "{} vertices", vertices.len());
     let lanes = |corner: usize| {
         (0..MOST_TRIANGLES).map(|lane| corners[lane][corner] << (4 * lane)).sum::<u32>()
@@ -67,6 +62,24 @@ pub(crate) fn write(words: &mut Vec<u32>, triangles: &[(u32, [Corner; 3])]) -> u
         words.extend(vertices.iter().map(|vertex| vertex.at[axis].to_bits()));
     }
     place
+}
+
+/// Corners with different names.
+struct Distinct {
+    corners: [Corner; 3 * MOST_TRIANGLES],
+    count: usize,
+}
+
+impl Distinct {
+    /// Where a corner is, after it has been added if it was not there.
+    fn place_of(&mut self, corner: Corner) -> usize {
+        let known = self.corners[..self.count].iter().position(|one| one.name == corner.name);
+        known.unwrap_or_else(|| {
+            self.corners[self.count] = corner;
+            self.count += 1;
+            self.count - 1
+        })
+    }
 }
 
 /// Where in the words of a leaf that begins at `place` its vertices are: the x of the first, and how many.

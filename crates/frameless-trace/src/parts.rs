@@ -23,9 +23,10 @@ use crate::wide::{Child, Node};
 /// Triangles of a part at most. Fewer: boxes find better places among fewer; more: memory, and cores with nothing to do.
 const PART: usize = 1 << 13;
 
-/// For so many triangles of a part there is a tree that finds its place among those of all parts. Fewer: rays visit less of the tree, which takes
-/// longer to build.
-const PER_ROOT: usize = 16;
+/// For so many triangles of a part there is a tree that finds its place among those of all parts. With 16 to 128 rays visit as much of it, within a
+/// hundredth or two either way. Fewer: memory, as the tree over all of them is built when everything else is there; more: walls of rooms
+/// lie too high in the tree.
+const PER_ROOT: usize = 48;
 
 /// Of the trees that find their place those that do so again.
 const REINSERTED: f32 = 1.0;
@@ -50,7 +51,7 @@ pub(crate) fn build(triangles: &impl Triangles) -> Tree {
     let mut parts = divide(&boxes, &mut order);
     // They are made again part by part: there is no room for all of them beside the tree.
     drop(boxes);
-    let mut all = Tree::with_room_for(order.len());
+    let mut all = Tree::with_room_for_any(order.len());
     // The last ones first: as the tree grows, what is left of the order shrinks.
     while !parts.is_empty() {
         let some = parts.split_off(parts.len().saturating_sub(2 * rayon::current_num_threads()));
@@ -59,9 +60,9 @@ pub(crate) fn build(triangles: &impl Triangles) -> Tree {
             build::build(triangles, &order[part.clone()], roots, STACK_PER_PART)
         };
         let built: Vec<Tree> = some.par_iter().map(build).collect();
-        built.into_iter().for_each(|part| all.append(part));
         order.truncate(some[0].start);
         order.shrink_to_fit();
+        built.into_iter().rev().for_each(|part| all.append(part));
     }
     all.join();
     all
@@ -74,11 +75,11 @@ fn boxes(triangles: &impl Triangles) -> Vec<TightBox> {
 
 impl Tree {
     /// Memory that is not used is given back when the tree is done; until then it is none of the machine's.
-    fn with_room_for(triangles: usize) -> Tree {
+    fn with_room_for_any(triangles: usize) -> Tree {
         /// A leaf with one triangle. All others take less for each.
         const WORDS: usize = 2 + 1 + 9;
-        /// Leaves have more than two triangles on average, nodes more than two children.
-        const TRIANGLES_PER_NODE: usize = 4;
+        /// There are 19 or 20.
+        const TRIANGLES_PER_NODE: usize = 12;
         Tree {
             nodes: Vec::with_capacity(triangles / TRIANGLES_PER_NODE),
             leaves: Vec::with_capacity(WORDS * triangles + LONGEST),
@@ -103,28 +104,32 @@ impl Tree {
         let children: Vec<Child> = roots.iter().map(|root| root.child).collect();
         let around = move |k: u32| aabb(&roots[k as usize].bounds);
         let mut binary = binary_tree(children.len() as u32, around, REINSERTED);
-        let mut collapse = Collapse::default();
-        collapse.plan(&binary, 1.0, |_| false);
-        let make = |collapse: &mut Collapse, binary: &Bvh2, moved_by: usize| {
-            let mut nodes = Vec::new();
-            let stack_need = collapse.make_root(binary, &mut nodes, |root| {
-                children[root[0] as usize].moved(moved_by, 0)
-            });
-            (nodes, stack_need + most_below)
+        let (mut collapse, end) = (Collapse::default(), self.nodes.len());
+        let mut make = |binary: &Bvh2, nodes: &mut Vec<Node>| {
+            collapse.plan(binary, 1.0, |_| false);
+            let below = |root: &[u32]| children[root[0] as usize];
+            most_below + collapse.make_root(binary, nodes, below)
         };
-        // How many nodes there are is known only once there are all.
-        let size = |(nodes, stack_need): (Vec<Node>, usize)| (nodes.len(), stack_need);
-        let (mut front, mut stack_need) = size(make(&mut collapse, &binary, 0));
+        let mut stack_need = make(&binary, &mut self.nodes);
         if stack_need > STACK_PER_TREE {
+            self.nodes.truncate(end);
             binary = halve(&boxes_of(&binary));
-            collapse.plan(&binary, 1.0, |_| false);
-            (front, stack_need) = size(make(&mut collapse, &binary, 0));
+            stack_need = make(&binary, &mut self.nodes);
         }
-        let (nodes, _) = make(&mut collapse, &binary, front);
         self.roots = vec![Root::new(&binary, 0, Child::ROOT, stack_need)];
-        drop((collapse, binary));
-        self.nodes.iter_mut().for_each(|node| *node = node.moved(front, 0));
-        self.nodes.extend(nodes);
+        drop((collapse, children, binary));
+        self.bring_to_front(end);
+    }
+
+    /// Exchanges the nodes up to `middle` and those behind, whose children the former are.
+    fn bring_to_front(&mut self, middle: usize) {
+        let front = self.nodes.len() - middle;
+        for child in self.nodes.iter_mut().flat_map(|node| &mut node.child) {
+            if *child != Node::UNUSED && !child.is_leaf() {
+                let node = child.node();
+                *child = Child::inner(if node < middle { node + front } else { node - middle });
+            }
+        }
         self.nodes.rotate_right(front);
     }
 }

@@ -28,6 +28,9 @@ fn unknown_and_missing_arguments() {
     frameless(&["view", "--rate", "-5"]).refused(2, "-5");
     frameless(&["render", "sphere", "--time", "inf", "-o", "x.png"]).refused(2, "finite");
     frameless(&["trace", "sphere", "--pixel", "1"]).refused(2, "X,Y");
+    frameless(&["info", "sphere", "--scene", ""]).refused(2, "wanted a number from 0, or a name");
+    let nothing = ["info", "sphere", "--animation", ""];
+    frameless(&nothing).refused(2, "wanted a number from 0, a name, all or none");
 }
 
 #[test]
@@ -48,7 +51,7 @@ fn an_environment_that_is_none_is_named() {
     let render = ["render", "sphere", "--size", "8x8", "-o", &out.to_string_lossy()];
     let with = |more: &[&str]| frameless(&[&render[..], more].concat());
     with(&["--env", "missing.hdr"]).refused(2, "missing.hdr");
-    with(&["--env", &text]).refused(2, "wanted a Radiance picture");
+    with(&["--env", &text]).refused(2, "byte 0: wanted a Radiance picture");
     with(&["--env-rotation", "90"]).refused(2, "--env");
     with(&["--env", &text, "--env-strength", "0"]).refused(2, "above zero");
     assert_eq!(files_in(folder.path()), 1);

@@ -121,7 +121,7 @@ fn scenes_and_animations_of_a_file_are_listed_and_chosen() {
     for line in ["0  \"day\", shown", "1  \"night\"\n", "0  \"walk\", played", "1  \"nod\"\n"] {
         assert!(told.contains(line), "no {line} in {told}");
     }
-    assert!(told.contains("only animation \"walk\" is played"), "{told}");
+    assert!(told.contains("only animation \"walk\" (/animations/0) is played"), "{told}");
     let told = info(&["--scene", "night", "--animation", "2"]).succeeded().out;
     for line in ["1  \"night\", shown", "2  \"run\", played", "at 4 nodes"] {
         assert!(told.contains(line), "no {line} in {told}");

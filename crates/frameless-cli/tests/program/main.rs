@@ -6,5 +6,6 @@ mod bench;
 mod compare;
 mod good_input;
 mod help;
+mod hostile;
 mod run;
 mod serve;
