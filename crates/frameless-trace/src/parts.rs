@@ -23,10 +23,12 @@ use crate::wide::{Child, Node};
 /// Triangles of a part at most. Fewer: boxes find better places among fewer; more: memory, and cores with nothing to do.
 const PART: usize = 1 << 13;
 
-/// For so many triangles of a part there is a tree that finds its place among those of all parts. With 16 to 128 rays visit as much of it, within a
-/// hundredth or two either way. Fewer: memory, as the tree over all of them is built when everything else is there; more: walls of rooms
-/// lie too high in the tree.
-const PER_ROOT: usize = 48;
+/// So many trees find their places among each other, if there are enough triangles for them. More: memory, as the tree over all of them is
+/// built when everything else is there.
+const ROOTS: usize = 1 << 14;
+
+/// For so many triangles there is one of these trees at least, and at most. Fewer: rays visit less of the tree, which takes longer to build.
+const PER_ROOT: [usize; 2] = [16, 64];
 
 /// Of the trees that find their place those that do so again.
 const REINSERTED: f32 = 1.0;
@@ -52,11 +54,12 @@ pub(crate) fn build(triangles: &impl Triangles) -> Tree {
     // They are made again part by part: there is no room for all of them beside the tree.
     drop(boxes);
     let mut all = Tree::with_room_for_any(order.len());
+    let per_root = (order.len() / ROOTS).clamp(PER_ROOT[0], PER_ROOT[1]);
     // The last ones first: as the tree grows, what is left of the order shrinks.
     while !parts.is_empty() {
         let some = parts.split_off(parts.len().saturating_sub(2 * rayon::current_num_threads()));
         let build = |part: &Range<usize>| {
-            let roots = (part.len() / PER_ROOT).max(2);
+            let roots = (part.len() / per_root).max(2);
             build::build(triangles, &order[part.clone()], roots, STACK_PER_PART)
         };
         let built: Vec<Tree> = some.par_iter().map(build).collect();

@@ -271,6 +271,20 @@ mod tests {
     }
 
     #[test]
+    fn what_is_made_is_limited_by_what_it_is_made_of() {
+        let mut budget = Budget::new(&Limits::default());
+        assert!(budget.allocate("/a", 1 << 28, 1).is_ok());
+        let refusal = budget.allocate("/a", 320, 1).unwrap_err().in_file("f").to_string();
+        assert!(refusal.contains("--max-memory"), "{refusal}");
+        budget.add_file(10);
+        assert!(budget.allocate("/a", 320, 1).is_ok());
+        assert!(budget.allocate("/a", 1, 1).is_err());
+        // Whoever wants twice as much of all has twice as much of nothing.
+        let limits = Limits { decoded_bytes: 8 << 30, ..Limits::default() };
+        assert!(Budget::new(&limits).allocate("/a", 1 << 29, 1).is_ok());
+    }
+
+    #[test]
     fn one_image_and_all_images_are_limited() {
         let limits = Limits { image_pixels: 10, total_pixels: 15, ..Limits::default() };
         let mut budget = Budget::new(&limits);

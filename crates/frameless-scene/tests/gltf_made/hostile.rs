@@ -56,6 +56,26 @@ fn unknown_chunks_are_skipped_aloud() {
     assert!(scene.warnings.iter().any(|warning| warning.contains("XTRA")), "{:?}", scene.warnings);
 }
 
+#[test]
+fn a_second_binary_chunk_is_refused_where_it_stands() {
+    let json = br#"{"asset":{"version":"2.0"}}  "#;
+    let bytes = glb(&[(b"JSON", json), (b"BIN\0", b"1234"), (b"BIN\0", b"5678")]);
+    let error = load_bytes("two.glb", &bytes, None, &Limits::default()).unwrap_err();
+    assert_eq!(error.place, Place::Byte(12 + 8 + json.len() as u64 + 8 + 4), "{error}");
+}
+
+/// RFC 2397 knows data that is not base64.
+#[test]
+fn percent_encoded_data_is_read() {
+    let maker = Maker::with_primitive(
+        |maker| json!({"attributes": {"POSITION": maker.floats("VEC3", &SQUARE)}}),
+    );
+    let text: String = maker.bytes.iter().map(|byte| format!("%{byte:02X}")).collect();
+    let json = maker.finished_json(Some(format!("data:application/octet-stream,{text}")));
+    let scene = load_bytes("a.gltf", json.to_string().as_bytes(), None, &Limits::default());
+    assert_eq!(scene.unwrap().geometries.len(), 1);
+}
+
 /// Whatever single byte is wrong, the scene keeps its promises or is refused.
 #[test]
 fn any_byte_changed_does_no_harm() {

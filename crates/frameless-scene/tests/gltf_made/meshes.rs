@@ -230,6 +230,36 @@ fn attributes_of_other_lengths_are_refused() {
     assert!(maker.refusal().contains("/meshes/0/primitives/0/attributes/NORMAL"));
 }
 
+/// Of the same accessors; another material makes another mesh.
+#[test]
+fn the_same_mesh_twice_in_the_file_is_one_geometry() {
+    let mut maker = Maker::with_primitive(
+        |maker| json!({"attributes": {"POSITION": maker.floats("VEC3", &SQUARE)}}),
+    );
+    let mesh = maker.json["meshes"][0].clone();
+    let red = json!({"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]});
+    maker.json["materials"] = json!([{}]);
+    maker.json["meshes"] = json!([mesh, red, mesh]);
+    maker.json["nodes"] =
+        (0..3).map(|mesh| json!({"mesh": mesh, "translation": [mesh, 0, 0]})).collect();
+    let scene = maker.load();
+    let geometries: Vec<u32> = scene.instances.iter().map(|one| one.geometry).collect();
+    assert_eq!((geometries, scene.geometries.len()), (vec![0, 1, 0], 2));
+}
+
+#[test]
+fn triangles_with_two_corners_in_one_vertex_are_dropped() {
+    let scene = Maker::with_primitive(|maker| {
+        let indices: Vec<u8> = [0, 1, 2, 2, 3, 0].to_vec();
+        let indices = maker.accessor(U8, "SCALAR", 6, &indices);
+        json!({"mode": 5, "indices": indices,
+            "attributes": {"POSITION": maker.floats("VEC3", &SQUARE)}})
+    })
+    .load();
+    // Of a strip's four the second and third turn it.
+    assert_eq!(mesh(&scene, 0).triangles, [[0, 1, 2], [2, 0, 3]]);
+}
+
 #[test]
 fn a_mesh_at_two_nodes_is_one_geometry_and_one_at_none_is_dropped() {
     let mut maker = Maker::with_primitive(
