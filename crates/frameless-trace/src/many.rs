@@ -25,6 +25,9 @@ pub const SHADED: usize = 16;
 /// Fewer rays than that are asked about one by one: to walk by turns takes memory that has to be made.
 const FEWEST: usize = 4;
 
+/// Trees of so many bytes do not fit into caches that a processor has for itself.
+const LARGE: usize = 16 << 20;
+
 /// What is known of some rays. Bits by ray; of those that are neither blocked nor passed nothing is known.
 pub(crate) struct Occluded {
     /// Those that are stopped.
@@ -58,9 +61,16 @@ impl Targets<'_> {
                 Some(false) => (),
             }
         }
-        let each = (rays, &*alone, f32::MAX);
-        self.by_turns::<_, false>(tree, each, &mut Nearest(found), &mut stack.ways);
-        if !self.top.is_empty() {
+        let is_worth_it = self.is_worth_taking_turns(tree);
+        if is_worth_it {
+            let each = (rays, &*alone, f32::MAX);
+            self.by_turns::<_, false>(tree, each, &mut Nearest(found), &mut stack.ways);
+        } else {
+            for &index in &alone {
+                found[index as usize] = self.closest(&rays[index as usize], stack);
+            }
+        }
+        if is_worth_it && !self.top.is_empty() {
             for &index in &alone {
                 let one = index as usize..index as usize + 1;
                 rest.also_closest(&rays[one.clone()], &mut found[one], stack);
@@ -92,7 +102,12 @@ impl Targets<'_> {
             }
         }
         any.first = 0;
-        self.by_turns::<_, true>(tree, (rays, &alone, until), &mut any, &mut stack.ways);
+        match self.is_worth_taking_turns(tree) {
+            true => {
+                self.by_turns::<_, true>(tree, (rays, &alone, until), &mut any, &mut stack.ways)
+            }
+            false => alone.iter().for_each(|index| any.doubtful |= 1 << index),
+        }
         stack.alone = alone;
         known.blocked = any.blocked;
         known.passed = !(any.blocked | any.doubtful);
@@ -117,6 +132,16 @@ impl Targets<'_> {
             Isa::Portable => group.walk::<Portable>(),
             #[cfg(target_arch = "x86_64")]
             Isa::Avx2(proof) => avx2::with(proof, group),
+        }
+    }
+
+    /// Whether rays that have nothing in common are better walked by turns. Without the registers of AVX-512 a step takes more than the same
+    /// of a ray alone, which is worth it where rays alone wait for memory.
+    fn is_worth_taking_turns(&self, tree: &Standing) -> bool {
+        match self.isa {
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx2(proof) if proof.wider.is_some() => true,
+            _ => tree.bytes() > LARGE,
         }
     }
 

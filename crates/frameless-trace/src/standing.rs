@@ -99,6 +99,11 @@ impl Triangles for All<'_> {
 }
 
 impl Standing {
+    /// What its nodes and leaves take.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&*self.tree.nodes) + size_of_val(&*self.tree.leaves)
+    }
+
     /// `None` if nothing stands.
     pub(crate) fn new(scene: &Scene) -> Option<Standing> {
         let places = places(scene);
