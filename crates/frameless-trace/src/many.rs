@@ -25,8 +25,8 @@ pub const SHADED: usize = 16;
 /// Fewer rays than that are asked about one by one: to walk by turns takes memory that has to be made.
 const FEWEST: usize = 4;
 
-/// Trees of so many bytes do not fit into caches that a processor has for itself.
-const LARGE: usize = 16 << 20;
+/// Trees of so many bytes do not fit into caches that a processor has for itself. Those of unit tests are small and large all the same.
+const LARGE: usize = if cfg!(test) { 1 << 11 } else { 16 << 20 };
 
 /// What is known of some rays. Bits by ray; of those that are neither blocked nor passed nothing is known.
 pub(crate) struct Occluded {
