@@ -13,7 +13,7 @@ use super::buffers::View;
 use super::document::Document;
 use super::error::{Fault, one_line};
 use super::json::Json;
-use super::limits::Budget;
+use super::limits::{Budget, PictureBytes};
 use super::png_chunks::picture;
 use super::uri::Uri;
 
@@ -60,10 +60,12 @@ impl<'a> FileImage<'a> {
         let ((width, height), decoded_bytes) = (decoder.dimensions(), decoder.total_bytes());
         drop(decoder);
         // Bytes that several pictures are of speak for one of them.
-        let has_been_told = match &self.source {
-            Source::View(view) => !document.budget.pictures.insert(*view),
-            _ => false,
+        let bytes = match &self.source {
+            Source::View(view) => Some(PictureBytes::View(*view)),
+            Source::Uri(Uri::Relative(path)) => Some(PictureBytes::File(path.clone())),
+            _ => None,
         };
+        let has_been_told = bytes.is_some_and(|bytes| !document.budget.pictures.insert(bytes));
         let told = if has_been_told { 0 } else { picture.len() };
         document.budget.add_image(pointer, [width, height], decoded_bytes, told)?;
         if width == 0 || height == 0 {

@@ -193,7 +193,7 @@ impl Placer<'_> {
     }
 }
 
-/// What an instance takes for its joints, and what of morph targets has to be read for each of its poses.
+/// What an instance takes for its joints and its own shape, if that deforms, and what of morph targets has to be read for each of its poses.
 fn pose_bytes(mesh: &Mesh, skin: Option<&Skin>) -> usize {
     // Now and before.
     let joints = skin.map_or(0, |skin| 2 * skin.joints.len() * size_of::<Affine3A>());
@@ -201,8 +201,21 @@ fn pose_bytes(mesh: &Mesh, skin: Option<&Skin>) -> usize {
         let [positions, normals] = [&target.positions, &target.normals];
         size_of_val(&positions[..]) + size_of_val(&normals[..]) + size_of_val(&target.colors[..])
     };
-    joints + mesh.targets.iter().map(displaced).sum::<usize>()
+    let deforms = skin.is_some() || !mesh.targets.is_empty();
+    let shape = match deforms {
+        true => {
+            BYTES_PER_POSED_VERTEX * mesh.positions.len()
+                + BYTES_PER_POSED_TRIANGLE * mesh.triangles.len()
+        }
+        false => 0,
+    };
+    joints + shape + mesh.targets.iter().map(displaced).sum::<usize>()
 }
+
+/// Where it is and its normal, now and before.
+const BYTES_PER_POSED_VERTEX: usize = 48;
+/// What is made of it for rays.
+const BYTES_PER_POSED_TRIANGLE: usize = 36;
 
 /// Where EXT_mesh_gpu_instancing wants the mesh, in the node's coordinates.
 fn read_places(
@@ -220,6 +233,9 @@ fn read_places(
             return Err(Fault::at(json.pointer(), wanted, count));
         }
         within(count as u64, document.budget.limits.instances, "instances", json.pointer())?;
+        if places.is_none() {
+            document.budget.allocate(json.pointer(), count, size_of::<Transform>())?;
+        }
         let places = places.get_or_insert_with(|| vec![Transform::IDENTITY; count]);
         let accessor = &document.accessors[accessor];
         match name {

@@ -1,6 +1,7 @@
 //! How much a file may ask for, and what it has asked for so far.
 
 use std::collections::HashSet;
+use std::path::{Path, PathBuf};
 
 use super::error::{Fault, Place, Problem};
 
@@ -72,8 +73,17 @@ pub(super) struct Budget {
     pixels: u64,
     thin_pixels: u64,
     keyframes: u64,
-    /// Buffer views of which a picture has been counted.
-    pub(super) pictures: HashSet<usize>,
+    /// Files that have been counted.
+    files: HashSet<PathBuf>,
+    /// Buffer views and files of which a picture has been counted.
+    pub(super) pictures: HashSet<PictureBytes>,
+}
+
+/// What several pictures may be of.
+#[derive(Debug, PartialEq, Eq, Hash)]
+pub(super) enum PictureBytes {
+    View(usize),
+    File(PathBuf),
 }
 
 impl Budget {
@@ -89,13 +99,16 @@ impl Budget {
             pixels: 0,
             thin_pixels: 0,
             keyframes: 0,
+            files: HashSet::new(),
             pictures: HashSet::new(),
         }
     }
 
-    /// There is a file of so many bytes.
-    pub(super) fn add_file(&mut self, bytes: usize) {
-        self.file_bytes = self.file_bytes.saturating_add(bytes as u64);
+    /// There is a file of so many bytes, however often it is named: the scene's own has no path.
+    pub(super) fn add_file(&mut self, path: &Path, bytes: usize) {
+        if self.files.insert(path.to_owned()) {
+            self.file_bytes = self.file_bytes.saturating_add(bytes as u64);
+        }
     }
 
     /// `count` things of `each` bytes are about to be allocated for what stands at `pointer`.
@@ -167,6 +180,9 @@ impl Budget {
         /// Of all texels, those that may come from next to nothing: by default 62 million, a second's work and 400 MB. A file of
         /// a few kilobytes could take as much as the largest scenes otherwise.
         const THIN_SHARE: u64 = 8;
+        /// Processors of graphics take 16,384 or twice as many; every column and row takes memory of its own when smaller copies are made.
+        const SIDE: u64 = 65_536;
+        within(u64::from(width.max(height)), SIDE, "pixels along a side of an image", pointer)?;
         let pixels = u64::from(width) * u64::from(height);
         within(pixels, self.limits.image_pixels, "pixels in one image", pointer)?;
         // Those of 16 bits per channel take as much as two.
@@ -276,7 +292,8 @@ mod tests {
         assert!(budget.allocate("/a", 1 << 28, 1).is_ok());
         let refusal = budget.allocate("/a", 320, 1).unwrap_err().in_file("f").to_string();
         assert!(refusal.contains("--max-memory"), "{refusal}");
-        budget.add_file(10);
+        budget.add_file(Path::new(""), 10);
+        budget.add_file(Path::new(""), 1 << 40);
         assert!(budget.allocate("/a", 320, 1).is_ok());
         assert!(budget.allocate("/a", 1, 1).is_err());
         // Whoever wants twice as much of all has twice as much of nothing.

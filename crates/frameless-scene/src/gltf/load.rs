@@ -75,7 +75,7 @@ fn read(path: &Path, limits: &Limits) -> Result<Vec<u8>, Fault> {
         return Err(whole(Problem::Unexpected { wanted, came: "something else".to_owned() }));
     }
     let file = File::open(path).map_err(|error| whole(Problem::Io(error)))?;
-    read_file(file, "", &mut Budget::new(limits)).map_err(|fault| whole(fault.problem))
+    read_file((file, path), "", &mut Budget::new(limits)).map_err(|fault| whole(fault.problem))
 }
 
 fn from_bytes(
@@ -88,7 +88,7 @@ fn from_bytes(
     within(bytes.len() as u64, limits.file_bytes, "bytes of file", "")?;
     let mut warnings = Warnings::default();
     let mut budget = Budget::new(limits);
-    budget.add_file(bytes.len());
+    budget.add_file(Path::new(""), bytes.len());
     let container = Container::split(bytes, &mut warnings)?;
     let value = parse(container.json, container.json_offset, &mut budget)?;
     let root = Json::root(&value);

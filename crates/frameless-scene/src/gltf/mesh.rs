@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3, Vec4};
 
 use crate::{Geometry, Material, Mesh, MorphTarget, TextureRef, UV_SETS};
 
-use super::attributes::{Attributes, Vertices};
+use super::attributes::{Attributes, TargetVertices, Vertices};
 use super::coincident::leave_out_coincident;
 use super::document::Document;
 use super::error::Fault;
@@ -215,14 +215,17 @@ impl Joiner<'_> {
             let shared = self.read_vertices(&primitive.attributes, document)?;
             let pointer = primitive.json.pointer();
             document.budget.add_vertices(pointer, 3 * triangles.len())?;
-            document.budget.allocate(pointer, 3 * triangles.len(), BYTES_PER_VERTEX)?;
-            let appended = self.append_vertices(flatten(&shared, &mut triangles));
+            let each = bytes_per_flat_vertex(&shared);
+            document.budget.allocate(pointer, 3 * triangles.len(), each)?;
+            let flat = flatten(&shared, &mut triangles);
+            let appended = self.append_vertices(flat, pointer, document)?;
             return self.append_triangles(primitive, triangles, &appended, document);
         }
         if !self.shared.contains_key(&primitive.attributes) {
             let mut vertices = self.read_vertices(&primitive.attributes, document)?;
             self.repair_normals(&mut vertices, &triangles, document);
-            let appended = self.append_vertices(vertices);
+            let pointer = primitive.json.pointer();
+            let appended = self.append_vertices(vertices, pointer, document)?;
             self.shared.insert(primitive.attributes.clone(), appended);
         }
         let appended = self.shared[&primitive.attributes].clone();
@@ -251,9 +254,15 @@ impl Joiner<'_> {
         }
     }
 
-    fn append_vertices(&mut self, vertices: Vertices) -> Shared {
+    fn append_vertices(
+        &mut self,
+        vertices: Vertices,
+        pointer: &str,
+        document: &mut Document<'_>,
+    ) -> Result<Shared, Fault> {
         let mesh = &mut self.mesh;
         let first = mesh.positions.len();
+        document.budget.allocate(pointer, made_up(mesh, &vertices), 1)?;
         append(&mut mesh.positions, vertices.positions);
         let all = mesh.positions.len();
         extend(&mut mesh.normals, vertices.normals, Vec3::Y, first, all);
@@ -269,7 +278,7 @@ impl Joiner<'_> {
             extend(&mut target.colors, more.colors, Vec4::ZERO, first, all);
         }
         let tangents = vertices.tangents.map(Rc::new);
-        Shared { first: first as u32, nowhere: Rc::new(vertices.nowhere), tangents }
+        Ok(Shared { first: first as u32, nowhere: Rc::new(vertices.nowhere), tangents })
     }
 
     fn append_triangles(
@@ -323,6 +332,41 @@ impl Joiner<'_> {
         extend(&mut self.mesh.tangents, tangents, tangents::UNKNOWN, before, all);
         Ok(())
     }
+}
+
+/// What is made up where vertices that are added to those of a mesh have joints or displacements that these lack, or lack some of theirs: bytes.
+fn made_up(mesh: &Mesh, added: &Vertices) -> usize {
+    let all = mesh.positions.len() + added.positions.len();
+    let gap = |have: usize, more: Option<usize>| match (have, more) {
+        (0, None) => 0,
+        (have, more) => all.saturating_sub(have + more.unwrap_or(0)),
+    };
+    let of_set = |k: usize| {
+        let have = mesh.influences.get(k).map_or(0, |set| set.joints.len());
+        gap(have, added.influences.get(k).map(|set| set.joints.len())) * BYTES_PER_INFLUENCES
+    };
+    let none = MorphTarget::default();
+    let of_target = |(k, more): (usize, &TargetVertices)| {
+        let have = mesh.targets.get(k).unwrap_or(&none);
+        12 * gap(have.positions.len(), more.positions.as_ref().map(Vec::len))
+            + 12 * gap(have.normals.len(), more.normals.as_ref().map(Vec::len))
+            + 16 * gap(have.colors.len(), more.colors.as_ref().map(Vec::len))
+    };
+    let sets = mesh.influences.len().max(added.influences.len());
+    let displacements = added.targets.iter().enumerate().map(of_target).sum::<usize>();
+    (0..sets).map(of_set).sum::<usize>() + displacements
+}
+
+/// Four joints and their weights.
+const BYTES_PER_INFLUENCES: usize = 8 + 16;
+
+/// Of each vertex that is made from one of `vertices`.
+fn bytes_per_flat_vertex(vertices: &Vertices) -> usize {
+    let displaced = |target: &TargetVertices| {
+        12 * usize::from(target.positions.is_some()) + 16 * usize::from(target.colors.is_some())
+    };
+    let targets: usize = vertices.targets.iter().map(displaced).sum();
+    BYTES_PER_VERTEX + vertices.influences.len() * BYTES_PER_INFLUENCES + targets
 }
 
 /// Position, normal, texture coordinates, colour.
@@ -423,5 +467,36 @@ impl Order {
             Order::Sequence(_) => position as u32,
             Order::Indices(indices) => indices[position],
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Influences;
+
+    #[test]
+    fn what_is_made_up_for_other_vertices_is_counted() {
+        let with_set = |count: usize| Influences {
+            joints: vec![[0; 4]; count],
+            weights: vec![[0.0; 4]; count],
+        };
+        let of = |count: usize, sets: usize| Vertices {
+            positions: vec![Vec3::ZERO; count],
+            influences: (0..sets).map(|_| with_set(count)).collect(),
+            ..Vertices::default()
+        };
+        let mut mesh = Mesh { positions: vec![Vec3::ZERO; 3], ..Mesh::default() };
+        assert_eq!(made_up(&mesh, &of(5, 0)), 0, "nobody has any");
+        assert_eq!(made_up(&mesh, &of(5, 2)), 2 * 3 * BYTES_PER_INFLUENCES);
+        mesh.influences = vec![with_set(3); 4];
+        assert_eq!(made_up(&mesh, &of(5, 4)), 0, "all have them");
+        assert_eq!(made_up(&mesh, &of(5, 1)), 3 * 5 * BYTES_PER_INFLUENCES);
+        let mut added = of(5, 4);
+        added.targets.push(TargetVertices {
+            positions: Some(vec![Vec3::ZERO; 5]),
+            ..TargetVertices::default()
+        });
+        assert_eq!(made_up(&mesh, &added), 3 * 12);
     }
 }

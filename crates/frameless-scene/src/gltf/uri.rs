@@ -66,7 +66,7 @@ impl<'a> Uri<'a> {
                 };
                 open_inside(folder, path)
                     .map_err(|problem| Fault { place: Place::Pointer(pointer.to_owned()), problem })
-                    .and_then(|file| read_file(file, pointer, budget))
+                    .and_then(|file| read_file((file, path), pointer, budget))
             }
         }
     }
@@ -88,7 +88,9 @@ fn relative_path(uri: &str) -> Option<PathBuf> {
     }
     let path = PathBuf::from(decoded.as_ref());
     let downwards = |step| matches!(step, Component::Normal(_) | Component::CurDir);
-    path.components().all(downwards).then_some(path)
+    // However it is written, it is the same file.
+    let steps = path.components().filter(|step| matches!(step, Component::Normal(_)));
+    path.components().all(downwards).then(|| steps.collect())
 }
 
 fn decode_base64(text: &str, pointer: &str, budget: &mut Budget) -> Result<Vec<u8>, Fault> {
@@ -117,13 +119,17 @@ fn open_inside(folder: &Path, path: &Path) -> Result<File, Problem> {
 }
 
 /// Reads an open file, refusing one that is too large before its bytes are in memory.
-pub(super) fn read_file(file: File, pointer: &str, budget: &mut Budget) -> Result<Vec<u8>, Fault> {
+pub(super) fn read_file(
+    (file, path): (File, &Path),
+    pointer: &str,
+    budget: &mut Budget,
+) -> Result<Vec<u8>, Fault> {
     let failed =
         |error| Fault { place: Place::Pointer(pointer.to_owned()), problem: Problem::Io(error) };
     let limit = budget.limits.file_bytes;
     let bytes = file.metadata().map_err(failed)?.len();
     within(bytes, limit, "bytes of file", pointer)?;
-    budget.add_file(bytes as usize);
+    budget.add_file(path, bytes as usize);
     budget.allocate(pointer, bytes as usize, 1)?;
     let mut content = Vec::with_capacity(bytes as usize);
     // The file may grow while it is read: what it was is what counts.
@@ -139,7 +145,7 @@ mod tests {
     fn only_paths_that_lead_downwards_are_taken() {
         for (uri, path) in [
             ("a.bin", Some("a.bin")),
-            ("./a/b.bin", Some("./a/b.bin")),
+            ("./a/b.bin", Some("a/b.bin")),
             ("Box%20With%20Spaces.bin", Some("Box With Spaces.bin")),
             ("Box With Spaces.bin", Some("Box With Spaces.bin")),
             ("%C3%A4.bin", Some("ä.bin")),
