@@ -24,7 +24,7 @@ fn value(rows: &[(String, f64)], name: &str) -> f64 {
 
 #[test]
 fn latency_is_told_with_and_without_pictures() {
-    let rows = rows(&["latency", "--rounds", "1", "--secs", "0.1", "--size", "64x48"]);
+    let rows = rows(&["latency", "--rounds", "1", "--secs", "0.5", "--size", "64x48"]);
     for pictures in ["", ".with_pictures"] {
         let [median, most] = ["p50", "p99"]
             .map(|percentile| value(&rows, &format!("latency{pictures}.{percentile}_ms")));
