@@ -278,3 +278,44 @@ fn distance2<U: Unit>([x, y]: [F8<U>; 2], step: [f32; 2]) -> F8<U> {
 fn plus<U: Unit>(from: F8<U>, step: f32) -> F8<U> {
     if step == 0.0 { from } else { from + F8::splat(step) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::rows::BLANK;
+    use super::*;
+    use crate::wide::{self, Task};
+
+    /// What a hole shows between a white sample at the first place around it, row by row, and a black one at the second, both to the right
+    /// of and below their pixels' centres.
+    struct Between<'a>([usize; 2], &'a mut f32);
+
+    impl Task for Between<'_> {
+        #[inline(always)]
+        fn run<U: Unit>(self) {
+            let mut rows = [const { [BLANK] }; 3];
+            rows.iter_mut().for_each(|[row]| row.object.fill(f32::from_bits(EMPTY)));
+            for (place, grey) in self.0.into_iter().zip([1.0, 0.0]) {
+                let ([row], column) = (&mut rows[place / 3], place % 3);
+                row.object[column] = f32::from_bits(7);
+                row.place.iter_mut().for_each(|place| place[column] = 0.4);
+                row.rgb.iter_mut().for_each(|channel| channel[column] = grey);
+            }
+            let near = Near::<1, 1>::new(rows.each_ref(), 0);
+            let model = Model::<U>::new(0.0, 1.0);
+            let object = near.around_holes::<U>(Tick::default()).object;
+            let [red, ..] = near.mean(&model, object, M8::splat(u32::MAX));
+            *self.1 = red.lanes()[0];
+        }
+    }
+
+    #[test]
+    fn who_is_nearer_counts_more() {
+        // Above and below, left and right, at two corners.
+        for pair in [[1, 7], [3, 5], [0, 8]] {
+            let [mut nearer, mut farther] = [0.0; 2];
+            wide::run(Between(pair, &mut nearer));
+            wide::run(Between([pair[1], pair[0]], &mut farther));
+            assert!(nearer > 0.9 && (nearer + farther - 1.0).abs() < 1e-5, "{pair:?} {nearer}");
+        }
+    }
+}
