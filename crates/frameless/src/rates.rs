@@ -1,7 +1,7 @@
 //! The learned rate of change of every tile.
 
-use crate::tile::TileGrid;
-use crate::{Size, wide};
+use crate::Size;
+use crate::tile::{LINE, PerTile, TileGrid};
 
 /// How fast the picture becomes wrong, tile by tile:
 ///
@@ -16,7 +16,7 @@ use crate::{Size, wide};
 pub struct Rates {
     pub(crate) grid: TileGrid,
     /// v.
-    tiles: Vec<f32>,
+    tiles: PerTile,
 }
 
 /// What a tile's rate is learned from.
@@ -51,26 +51,32 @@ impl Evidence {
 
 impl Rates {
     pub(crate) fn new(grid: TileGrid) -> Rates {
-        let tiles = vec![0.0; grid.len()];
+        let tiles = PerTile::new(grid.len());
         Rates { grid, tiles }
     }
 
     /// v of a tile is another one now. Returns what it was.
     #[inline]
     pub(crate) fn set(&mut self, tile: usize, rate: f32) -> f32 {
-        std::mem::replace(&mut self.tiles[tile], rate)
+        std::mem::replace(self.tiles.of_mut(tile), rate)
     }
 
     /// v of a tile: squared error per channel and second.
     #[inline]
     pub(crate) fn of_tile(&self, tile: usize) -> f32 {
-        self.tiles[tile]
+        self.tiles.of(tile)
+    }
+
+    /// v of all tiles; 0 behind the last.
+    #[inline(always)]
+    pub(crate) fn of_tiles(&self) -> &PerTile {
+        &self.tiles
     }
 
     /// Begin to fetch what is known of a tile.
     #[inline]
     pub(crate) fn prefetch(&self, tile: usize) {
-        wide::prefetch(&self.tiles, tile);
+        self.tiles.prefetch(tile / LINE);
     }
 
     /// Of the picture whose tiles these are.

@@ -2,6 +2,7 @@
 
 use crate::Size;
 use crate::traced::{Place, TILE_PIXELS};
+use crate::wide::{self, F8, Unit};
 
 /// Which pixel lies in which tile. Tiles are numbered row by row.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -143,6 +144,61 @@ impl TileGrid {
             x1: x0.saturating_add(self.side).min(self.size.width),
             y1: y0.saturating_add(self.side).min(self.size.height),
         }
+    }
+}
+
+/// Numbers in a line of the cache.
+pub(crate) const LINE: usize = 16;
+
+/// A number for every tile, those of [`LINE`] consecutive ones in a line of the cache; what is behind the last is 0.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PerTile(Vec<Line>);
+
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+struct Line([f32; LINE]);
+
+impl PerTile {
+    /// All 0.
+    pub(crate) fn new(tiles: usize) -> PerTile {
+        PerTile(vec![Line::default(); tiles.div_ceil(LINE)])
+    }
+
+    #[inline(always)]
+    pub(crate) fn of(&self, tile: usize) -> f32 {
+        self.0[tile / LINE].0[tile % LINE]
+    }
+
+    #[inline(always)]
+    pub(crate) fn of_mut(&mut self, tile: usize) -> &mut f32 {
+        &mut self.0[tile / LINE].0[tile % LINE]
+    }
+
+    pub(crate) fn lines(&self) -> usize {
+        self.0.len()
+    }
+
+    #[inline(always)]
+    pub(crate) fn line(&self, line: usize) -> &[f32; LINE] {
+        &self.0[line].0
+    }
+
+    #[inline(always)]
+    pub(crate) fn line_mut(&mut self, line: usize) -> &mut [f32; LINE] {
+        &mut self.0[line].0
+    }
+
+    /// A line's two halves.
+    #[inline(always)]
+    pub(crate) fn halves<U: Unit>(&self, line: usize) -> [F8<U>; 2] {
+        let line = self.line(line);
+        [F8::load(line, 0), F8::load(line, LINE / 2)]
+    }
+
+    /// Begins to fetch a line.
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, line: usize) {
+        wide::prefetch(&self.0, line);
     }
 }
 

@@ -183,16 +183,6 @@ impl Traced {
         resized
     }
 
-    /// Begins to fetch the marks above and below a pixel, as far as they are in its tile: two lines at most.
-    #[inline(always)]
-    pub(crate) fn prefetch_around(&self, place: Place) {
-        if let Some(tile) = self.tiles.get(place.tile()) {
-            let (side, within) = (1 << SIDE_BITS, place.within());
-            wide::prefetch(&tile.0, within.saturating_sub(side));
-            wide::prefetch(&tile.0, (within + side).min(TILE_PIXELS - 1));
-        }
-    }
-
     /// Begins to fetch a pixel's mark.
     #[inline(always)]
     pub(crate) fn prefetch(&self, place: Place) {

@@ -5,68 +5,85 @@
 //! while c_i ≥ 1:   c_i ← c_i − 1, and tile i is drawn
 //! ```
 
+use crate::tile::LINE;
 use crate::wide::{F8, Unit};
 
-/// Tiles in a block; 16 numbers are a line of the cache.
-pub(super) const BLOCK: usize = 16;
+/// Consecutive tiles: those whose numbers are in one line of the cache.
+pub(super) const BLOCK: usize = LINE;
 
-/// Consecutive tiles; of the last block some may not be there, and have no share.
-#[derive(Clone, Copy, Debug, Default)]
-#[repr(align(64))]
-pub(super) struct Block {
-    /// c.
-    pub(super) credit: [f32; BLOCK],
-    /// w.
-    pub(super) weight: [f32; BLOCK],
+/// What a block has to share out: `got` draws among shares of `sum` together.
+#[derive(Clone, Copy)]
+pub(super) struct Due<U: Unit> {
+    pub(super) got: f32,
+    /// q, half by half.
+    pub(super) shares: [F8<U>; 2],
+    /// Σ q.
+    pub(super) sum: f32,
+    /// The number of the first tile.
+    pub(super) first: u32,
 }
 
-impl Block {
-    /// Calls `take` with the tiles that are drawn, when the block has got `got` draws; nobody if none has a share. `even`: e.
+impl<U: Unit> Due<U> {
+    /// Appends the tiles that are drawn; nobody if none has a share. `credits`: c.
     #[inline(always)]
-    pub(super) fn draw<U: Unit>(
-        &mut self,
-        [a, b]: [f32; 2],
-        even: &[f32; BLOCK],
-        got: f32,
-        mut take: impl FnMut(usize),
-    ) {
-        let (a, b) = (F8::<U>::splat(a), F8::splat(b));
-        let mut q = [0.0; BLOCK];
-        for half in [0, BLOCK / 2] {
-            let eight = a * F8::load(&self.weight, half) + b * F8::load(even, half);
-            q[half..half + BLOCK / 2].copy_from_slice(&eight.lanes());
-        }
-        let shares = sum(&q);
-        let part = got / shares;
+    pub(super) fn draw(self, credits: &mut [f32; BLOCK], drawn: &mut Vec<u32>) {
+        let Due { got, shares, sum, first } = self;
+        let part = got / sum;
         // Nor where shares are too small for numbers: nobody is drawn without end.
-        if shares <= 0.0 || !part.is_finite() {
+        if sum <= 0.0 || !part.is_finite() {
             return;
         }
         let part = F8::<U>::splat(part);
-        let mut ripe = 0;
-        for half in [0, BLOCK / 2] {
-            let credit = F8::load(&self.credit, half) + part * F8::load(&q, half);
-            self.credit[half..half + BLOCK / 2].copy_from_slice(&credit.lanes());
-            ripe |= (!credit.less_than(F8::splat(1.0)).bits() & 255) << half;
+        let (mut once, mut twice) = (0, 0);
+        for (half, shares) in [0, BLOCK / 2].into_iter().zip(shares) {
+            let credit = F8::load(credits, half) + part * shares;
+            let is_drawn = credit.less_than(F8::splat(1.0)).not();
+            let left = (credit - F8::splat(1.0)).or(is_drawn, credit);
+            left.store(credits, half);
+            once |= is_drawn.bits() << half;
+            twice |= left.less_than(F8::splat(1.0)).not().bits() << half;
         }
-        while ripe != 0 {
-            let tile = ripe.trailing_zeros() as usize;
-            ripe &= ripe - 1;
-            let draws = self.credit[tile] as u32;
-            self.credit[tile] -= draws as f32;
-            (0..draws).for_each(|_| take(tile));
+        if twice == 0 {
+            push_bits(drawn, first, once);
+            return;
+        }
+        while once != 0 {
+            let tile = once.trailing_zeros();
+            once &= once - 1;
+            let credit = &mut credits[tile as usize];
+            let more = *credit as u32;
+            *credit -= more as f32;
+            drawn.extend((0..=more).map(|_| first + tile));
         }
     }
 }
 
-/// In pairs, which a processor adds side by side.
+/// Appends the numbers of the bits that are set, counted from `first` on. Four at a time are written in any case, so that nobody has to guess
+/// how many there are.
 #[inline(always)]
-pub(super) fn sum(numbers: &[f32; BLOCK]) -> f32 {
-    let mut fours = [0.0; 4];
-    for numbers in numbers.as_chunks::<4>().0 {
-        for (sum, number) in fours.iter_mut().zip(numbers) {
-            *sum += number;
+pub(super) fn push_bits(numbers: &mut Vec<u32>, first: u32, mut bits: u32) {
+    let end = numbers.len() + bits.count_ones() as usize;
+    loop {
+        let mut four = [0; 4];
+        for number in &mut four {
+            *number = first + bits.trailing_zeros();
+            bits &= bits.wrapping_sub(1);
         }
+        numbers.extend_from_slice(&four);
+        if bits == 0 {
+            break;
+        }
+    }
+    numbers.truncate(end);
+}
+
+/// Of both halves of a block, in pairs, which a processor adds side by side.
+#[inline(always)]
+pub(super) fn sum<U: Unit>([left, right]: [F8<U>; 2]) -> f32 {
+    let mut fours = [0.0; 4];
+    let eight = (left + right).lanes();
+    for (sum, pair) in fours.iter_mut().zip(0..4) {
+        *sum = eight[pair] + eight[pair + 4];
     }
     (fours[0] + fours[2]) + (fours[1] + fours[3])
 }
@@ -76,14 +93,23 @@ mod tests {
     use super::*;
     use crate::wide::{self, Task};
 
+    /// A block with weights and even parts.
+    #[derive(Default)]
+    struct Block {
+        credit: [f32; BLOCK],
+        weight: [f32; BLOCK],
+    }
+
     /// What one block draws by turns.
-    struct Turns<'a>(&'a mut Block, &'a [f32; BLOCK], f32, &'a mut Vec<usize>);
+    struct Turns<'a>(&'a mut Block, &'a [f32; BLOCK], f32, &'a mut Vec<u32>);
 
     impl Task for Turns<'_> {
         #[inline(always)]
         fn run<U: Unit>(self) {
             let Turns(block, even, got, drawn) = self;
-            block.draw::<U>([2.0, 0.25], even, got, |tile| drawn.push(tile));
+            let q: [f32; BLOCK] = std::array::from_fn(|i| 2.0 * block.weight[i] + 0.25 * even[i]);
+            let shares = [F8::<U>::load(&q, 0), F8::load(&q, BLOCK / 2)];
+            Due { got, shares, sum: sum(shares), first: 0 }.draw(&mut block.credit, drawn);
         }
     }
 

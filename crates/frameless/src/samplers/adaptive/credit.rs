@@ -12,14 +12,15 @@
 //! ([`weights`](super::weights)); the even part is not weighted.
 
 use super::AdaptiveStage;
+use super::block::BLOCK;
 use super::order::{self, Order};
-use super::shares::Shares;
+use super::shares::{Shares, Weigh};
 use super::tiles::{Tile, Tiles};
 use super::why::Why;
 use crate::rates::Rates;
-use crate::tile::TileGrid;
 use crate::traced::{Mark, Place, TILE_PIXELS};
-use crate::{Canvas, Rng, Time, wide};
+use crate::wide::{self, F8, Unit};
+use crate::{Canvas, Rng, Time};
 
 /// ε: the part of the samples that is spread evenly over the picture, so that every pixel has a floor frequency.
 const EVENLY: f32 = 0.2;
@@ -39,10 +40,32 @@ pub(crate) struct Credit {
     drawn: Vec<u32>,
 }
 
-/// m √v.
-#[inline]
-fn weight(m: f32, rate: f32) -> f32 {
-    m * (rate + LEAST_RATE).sqrt()
+/// m √v of all tiles.
+pub(super) struct ByRate<'a> {
+    pub(super) rates: &'a Rates,
+    /// m; empty: all are 1.
+    pub(super) m: &'a [f32],
+}
+
+impl Weigh for ByRate<'_> {
+    #[inline(always)]
+    fn halves<U: Unit>(&self, block: usize) -> [F8<U>; 2] {
+        let [left, right] = self.rates.of_tiles().halves(block);
+        let least = F8::splat(LEAST_RATE);
+        let roots = [(left + least).sqrt(), (right + least).sqrt()];
+        if self.m.is_empty() {
+            return roots;
+        }
+        let (rest, mut m) = (&self.m[block * BLOCK..], [0.0; BLOCK]);
+        let tiles = rest.len().min(BLOCK);
+        m[..tiles].copy_from_slice(&rest[..tiles]);
+        [F8::load(&m, 0) * roots[0], F8::load(&m, BLOCK / 2) * roots[1]]
+    }
+
+    #[inline(always)]
+    fn prefetch(&self, block: usize) {
+        self.rates.of_tiles().prefetch(block);
+    }
 }
 
 impl Credit {
@@ -63,20 +86,14 @@ impl Credit {
     }
 
     /// What tiles count has changed, all at once.
-    pub(crate) fn weigh_all(&mut self, rates: &Rates, m: impl Fn(usize) -> f32) {
-        self.shares.set_weights(|tile| weight(m(tile), rates.of_tile(tile)));
+    pub(crate) fn weigh_all(&mut self, weights: &ByRate) {
+        self.shares.weigh_all(weights);
     }
 
     /// A tile's v has changed.
     #[inline]
-    pub(crate) fn weigh(&mut self, tile: usize, m: f32, rate: f32) {
-        self.shares.set(tile, weight(m, rate));
-    }
-
-    /// Begin to fetch what [`Credit::weigh`] changes.
-    #[inline]
-    pub(crate) fn prefetch(&self, tile: usize) {
-        self.shares.prefetch(tile);
+    pub(crate) fn touch(&mut self, tile: usize) {
+        self.shares.touch(tile);
     }
 
     /// (a, b) of [`Shares::draw`] for a number of samples, of which `least_even` are spread evenly at the least.
@@ -89,9 +106,9 @@ impl Credit {
     }
 
     /// The part of the samples that each tile gets, of those that holes and fronts leave.
-    pub(crate) fn shares(&self) -> Vec<f32> {
+    pub(crate) fn shares(&self, weights: &ByRate) -> Vec<f32> {
         let (a, b) = self.scale(1.0, 0.0);
-        self.shares.all(a, b)
+        self.shares.all(a, b, weights)
     }
 
     /// Gives out about `count` samples, exactly on average; `least_even` of them are spread evenly, if they are as many.
@@ -99,16 +116,18 @@ impl Credit {
         &mut self,
         now: Time,
         canvas: &Canvas,
-        grid: &TileGrid,
+        weights: &ByRate,
         tiles: &mut Tiles,
         [count, least_even]: [f32; 2],
         mut take: impl FnMut(u32),
     ) {
+        self.shares.renew(weights);
         let (a, b) = self.scale(count, least_even);
         let (marks, now) = (canvas.traced().tiles(), Mark::at(now));
+        let grid = &weights.rates.grid;
         let Credit { shares, order, drawn, .. } = self;
         drawn.clear();
-        shares.draw(a, b, drawn);
+        shares.draw(a, b, weights, drawn);
         // What is looked at lies all over the picture: it is fetched before, tile by tile and then a few tiles' marks.
         drawn.iter().for_each(|&tile| tiles.prefetch(tile as usize));
         for few in drawn.chunks(FEW) {

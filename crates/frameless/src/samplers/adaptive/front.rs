@@ -28,7 +28,7 @@ const ADAPT_PER_SEC: f64 = 29.0;
 const MOST_AT_ONCE: f64 = 2.0;
 
 /// How many tiles ahead of the one looked at the next is fetched.
-const AHEAD: usize = 8;
+const AHEAD: usize = 32;
 
 /// Pixels beside changes, tile by tile.
 pub(crate) struct Front {
@@ -40,6 +40,19 @@ pub(crate) struct Front {
     /// Of the observations at hand, those that are part of a front, and room for the others.
     changed: Vec<(Place, Mark)>,
     parts: usize,
+    /// Reused from batch to batch.
+    near: Vec<Near>,
+    begin_to_wait: Vec<u32>,
+}
+
+/// Pixels of a tile that are beside a change.
+#[derive(Clone, Copy, Debug, Default)]
+struct Near {
+    tile: u32,
+    /// When the change was found.
+    found: Mark,
+    /// In at most three rows.
+    pixels: u64,
 }
 
 /// A bit per pixel of a tile.
@@ -116,6 +129,8 @@ impl Front {
             adapted: Time::ZERO,
             changed: Vec::new(),
             parts: 0,
+            near: Vec::new(),
+            begin_to_wait: Vec::new(),
         }
     }
 
@@ -144,22 +159,47 @@ impl Front {
 
     /// The neighbours of samples that are part of a front wait from now on.
     pub(crate) fn observe(&mut self, tiles: &mut Tiles, canvas: &Canvas) {
-        let changed = std::mem::take(&mut self.changed);
         let (traced, fresh) = (canvas.traced(), half_ticks(self.fresh_secs));
-        wide::run(QueueBeside {
-            traced,
-            fresh,
-            changed: &changed[..self.parts],
-            front: self,
-            tiles,
-        });
-        self.changed = changed;
+        let count = self.find_near(traced.grid());
+        let begin_to_wait = &mut self.begin_to_wait;
+        begin_to_wait.resize(count.max(begin_to_wait.len()), 0);
+        let mut waiting = 0;
+        let near = &self.near[..count];
+        wide::run(LookAtNear { near, traced, fresh, tiles, begin_to_wait, waiting: &mut waiting });
+        self.waiting.extend(&self.begin_to_wait[..waiting]);
+    }
+
+    /// What is beside changes, tile by tile. Returns how many there are.
+    fn find_near(&mut self, grid: &TileGrid) -> usize {
+        let (changed, near) = (&self.changed[..self.parts], &mut self.near);
+        near.resize((4 * changed.len()).max(near.len()), Near::default());
+        let mut count = 0;
+        for &(place, found) in changed {
+            let Beside { own, others: [beside, beyond, corner], step: [dx, dy] } =
+                BESIDE[place.within()];
+            let (tile, [column, row]) = (place.tile() as u32, grid.column_and_row(place.tile()));
+            let across = (dx != 0) & (column.wrapping_add_signed(dx) < grid.columns);
+            let down = (dy != 0) & (row.wrapping_add_signed(dy) < grid.rows);
+            let (side, other) = (tile.wrapping_add_signed(dx), dy * grid.columns as i32);
+            // Written in any case, so that nobody has to guess which there are.
+            let four = near[count..].first_chunk_mut::<4>().expect("room for four each");
+            let mut next = 0;
+            let mut put = |tile: u32, pixels: u64, is_there: bool| {
+                four[next] = Near { tile, found, pixels };
+                next += usize::from(is_there);
+            };
+            put(tile, own, true);
+            put(side, beside, across);
+            put(tile.wrapping_add_signed(other), beyond, down);
+            put(side.wrapping_add_signed(other), corner, across & down);
+            count += next;
+        }
+        count
     }
 
     #[inline]
-    fn wait(&mut self, tile: usize, front: &mut TileFront, is_wanted: bool) {
-        // Both at once: one branch that is hardly ever taken.
-        if is_wanted & !front.waits {
+    fn wait(&mut self, tile: usize, front: &mut TileFront) {
+        if !front.waits {
             front.waits = true;
             self.waiting.push_back(tile as u32);
         }
@@ -169,7 +209,7 @@ impl Front {
     pub(crate) fn suspect(&mut self, tiles: &mut Tiles, place: Place) {
         let front = &mut tiles.of_mut(place.tile()).front;
         front.suspect |= 1 << place.within();
-        self.wait(place.tile(), front, true);
+        self.wait(place.tile(), front);
     }
 
     /// Of how many seconds neighbours are left alone now.
@@ -213,75 +253,49 @@ impl Front {
     }
 }
 
-/// Queues what is beside pixels that have changed.
-struct QueueBeside<'a> {
-    front: &'a mut Front,
-    tiles: &'a mut Tiles,
+/// Finds the tiles that begin to wait.
+struct LookAtNear<'a> {
+    near: &'a [Near],
     traced: &'a Traced,
     /// In half ticks.
     fresh: i32,
-    /// Where, and when that was found.
-    changed: &'a [(Place, Mark)],
+    tiles: &'a mut Tiles,
+    /// As many as there are in `near`.
+    begin_to_wait: &'a mut [u32],
+    /// How many of them are.
+    waiting: &'a mut usize,
 }
 
-impl Task for QueueBeside<'_> {
+impl Task for LookAtNear<'_> {
+    /// Those that were traced `fresh` before the change was found, or earlier.
     #[inline(always)]
-    fn run<U: Unit>(mut self) {
-        for (i, &(place, found)) in self.changed.iter().enumerate() {
-            if let Some(&(later, _)) = self.changed.get(i + AHEAD) {
-                self.traced.prefetch_around(later);
+    fn run<U: Unit>(self) {
+        let LookAtNear { near, traced, fresh, tiles, begin_to_wait, waiting } = self;
+        let first_row = |pixels: u64| (pixels.trailing_zeros() / 8).min(5) as usize;
+        for (i, &Near { tile, found, pixels }) in near.iter().enumerate() {
+            if let Some(later) = near.get(i + AHEAD) {
+                let (marks, first) =
+                    (&traced.tiles()[later.tile as usize].0, first_row(later.pixels));
+                wide::prefetch(marks, 8 * first);
+                wide::prefetch(marks, 8 * (first + 2));
+                tiles.prefetch(later.tile as usize);
             }
-            let Beside { own, others, step } = &BESIDE[place.within()];
-            self.queue::<U>(place.tile(), *own, found);
-            if *step != [0; 2] {
-                self.queue_others::<U>(place.tile(), others, *step, found);
+            let marks = &traced.tiles()[tile as usize].0;
+            // Always three rows, so that nobody has to guess how many.
+            let first = first_row(pixels);
+            let latest = M8::<U>::splat(found.0.wrapping_sub(fresh as u32));
+            let mut young = 0;
+            for row in 0..3 {
+                let since = latest.minus(M8::load(marks, 8 * (first + row)));
+                young |= u64::from(since.less_than(M8::splat(0)).bits()) << (8 * row);
             }
-        }
-    }
-}
-
-impl QueueBeside<'_> {
-    /// Of some `pixels` of a tile, in at most three rows, those that were traced `fresh` before a change was `found`, or earlier.
-    #[inline(always)]
-    fn queue<U: Unit>(&mut self, tile: usize, pixels: u64, found: Mark) {
-        let marks = &self.traced.tiles()[tile].0;
-        // Always three rows, so that nobody has to guess how many.
-        let first = (pixels.trailing_zeros() / 8).min(5);
-        let latest = M8::<U>::splat(found.0.wrapping_sub(self.fresh as u32));
-        let mut young = 0;
-        for row in 0..3 {
-            let since = latest.minus(M8::load(marks, 8 * (first + row) as usize));
-            young |= u64::from(since.less_than(M8::splat(0)).bits() & 255) << (8 * row);
-        }
-        let stale = pixels & !(young << (8 * first));
-        let front = &mut self.tiles.of_mut(tile).front;
-        front.beside |= stale;
-        self.front.wait(tile, front, stale != 0);
-    }
-
-    /// The same in the tiles to which `step` leads, as far as there are such.
-    #[inline(always)]
-    fn queue_others<U: Unit>(
-        &mut self,
-        tile: usize,
-        [beside, beyond, corner]: &[u64; 3],
-        [dx, dy]: [i32; 2],
-        found: Mark,
-    ) {
-        let grid = self.traced.grid();
-        let [column, row] = grid.column_and_row(tile);
-        let (across, down) = (column.wrapping_add_signed(dx), row.wrapping_add_signed(dy));
-        let has_across = dx != 0 && across < grid.columns;
-        let has_down = dy != 0 && down < grid.rows;
-        let tile_at = |column: u32, row: u32| (row * grid.columns + column) as usize;
-        if has_across {
-            self.queue::<U>(tile_at(across, row), *beside, found);
-        }
-        if has_down {
-            self.queue::<U>(tile_at(column, down), *beyond, found);
-        }
-        if has_across && has_down {
-            self.queue::<U>(tile_at(across, down), *corner, found);
+            let stale = pixels & !(young << (8 * first));
+            let front = &mut tiles.of_mut(tile as usize).front;
+            front.beside |= stale;
+            // Neither is it guessed who begins to wait.
+            begin_to_wait[*waiting] = tile;
+            *waiting += usize::from((stale != 0) & !front.waits);
+            front.waits |= stale != 0;
         }
     }
 }

@@ -31,7 +31,7 @@ use crate::rates::Rates;
 use crate::tile::TileGrid;
 use crate::traced::Place;
 use crate::{Canvas, Insight, Observation, Refinement, Request, Rng, Sampler, Time, Weights};
-use credit::Credit;
+use credit::{ByRate, Credit};
 use front::Front;
 use late::Late;
 use refine::Refine;
@@ -135,7 +135,7 @@ impl State {
 
     /// What tiles count has changed.
     fn weigh_all(&mut self) {
-        self.credit.weigh_all(&self.rates, |tile| self.weights.of_tile(tile));
+        self.credit.weigh_all(&ByRate { rates: &self.rates, m: self.weights.of_tiles() });
         self.refine.weigh_all(|tile| self.weights.of_tile(tile));
     }
 
@@ -247,7 +247,6 @@ impl State {
         }
         self.tiles.prefetch(tile);
         self.rates.prefetch(tile);
-        self.credit.prefetch(tile);
     }
 
     fn observe_refinement(&mut self, place: Place, n: u16, refinement: &Refinement) {
@@ -277,12 +276,9 @@ impl State {
         tile.observe_age(age_secs);
         let after = tile.evidence.observe(observed.change, age_secs, weight);
         let before = self.rates.set(number, after);
-        // Where nothing ever changes, neither does the tile's share.
-        if after != before {
-            self.credit.weigh(number, self.weights.of_tile(number), after);
-            self.hot += usize::from(after > HOT_RATE);
-            self.hot -= usize::from(before > HOT_RATE);
-        }
+        self.credit.touch(number);
+        self.hot += usize::from(after > HOT_RATE);
+        self.hot -= usize::from(before > HOT_RATE);
     }
 }
 
@@ -312,7 +308,7 @@ impl Sampler for Adaptive {
             let rest = count - (requests.len() - start);
             state.choose_late(now, canvas, rest, requests);
         }
-        let State { credit, refine, rates, tiles, owed, .. } = state;
+        let State { credit, refine, rates, tiles, weights, owed, .. } = state;
         let left = (count - (requests.len() - start)) as f32;
         let spatial = left * (1.0 - refine.temporal_part(self.temporal));
         if spatial > 0.0 {
@@ -321,7 +317,8 @@ impl Sampler for Adaptive {
         let before = requests.len();
         let rest = count as f32 - (before - start) as f32;
         let counts = [rest + *owed, LEAST_EVEN * left];
-        credit.draw(now, canvas, &rates.grid, tiles, counts, |pixel| {
+        let weights = ByRate { rates, m: weights.of_tiles() };
+        credit.draw(now, canvas, &weights, tiles, counts, |pixel| {
             requests.push(Request::centre(pixel));
         });
         *owed += rest - (requests.len() - before) as f32;
@@ -383,7 +380,8 @@ impl Sampler for Adaptive {
     fn inspect(&self, _now: Time, canvas: &Canvas) -> Insight {
         let of = |state: &&State| state.generation == canvas.generation();
         let Some(state) = self.state.as_ref().filter(of) else { return Insight::default() };
-        let tiles = state.credit.shares();
+        let weights = ByRate { rates: &state.rates, m: state.weights.of_tiles() };
+        let tiles = state.credit.shares(&weights);
         let grid = &state.rates.grid;
         let pixels = 0..canvas.size().pixels() as u32;
         let tile_probability: Vec<f32> = pixels.map(|p| tiles[grid.tile_of(p)]).collect();

@@ -7,6 +7,7 @@
 
 use crate::traced::{HALF_TICKS_PER_SEC, Mark, TILE_PIXELS, TileMarks};
 use crate::{Rng, bayer};
+use std::hint::select_unpredictable;
 
 /// Pixels looked at before one is taken that is younger than half the mean age of its tile.
 const TRIES: u32 = 4;
@@ -48,12 +49,25 @@ impl Order {
     /// The next of the `pixels` of a tile, a bit for each, of which there is at least one.
     #[inline(always)]
     pub(crate) fn next(&mut self, pixels: u64, turn: &mut u8) -> usize {
+        if self.random.is_some() {
+            return self.next_at_random(pixels, turn);
+        }
         loop {
             let within = self.peek(*turn);
-            *turn = match &mut self.random {
-                None => turn.wrapping_add(1),
-                Some(rng) => rng.next_u32() as u8,
-            };
+            *turn = turn.wrapping_add(1);
+            if pixels >> within & 1 == 1 {
+                return within;
+            }
+        }
+    }
+
+    /// Apart, so that it is in nobody's way.
+    #[cold]
+    #[inline(never)]
+    fn next_at_random(&mut self, pixels: u64, turn: &mut u8) -> usize {
+        loop {
+            let within = self.peek(*turn);
+            *turn = self.random.as_mut().map_or(0, |rng| rng.next_u32() as u8);
             if pixels >> within & 1 == 1 {
                 return within;
             }
@@ -72,15 +86,19 @@ impl Order {
     ) -> usize {
         let mut oldest = self.next(pixels, turn);
         let mut oldest_age = Mark(marks[oldest]).age(now);
+        if oldest_age as f32 > enough {
+            return oldest;
+        }
+        // Three of four times that is all; how many more are looked at nobody can guess, hence all are.
+        let mut next_turn = *turn;
         for _ in 1..TRIES {
-            if oldest_age as f32 > enough {
-                break;
-            }
-            let within = self.next(pixels, turn);
+            let is_enough = oldest_age as f32 > enough;
+            let within = self.next(pixels, &mut next_turn);
+            *turn = select_unpredictable(is_enough, *turn, next_turn);
             let age = Mark(marks[within]).age(now);
-            if age > oldest_age {
-                (oldest, oldest_age) = (within, age);
-            }
+            let is_older = !is_enough & (age > oldest_age);
+            oldest = select_unpredictable(is_older, within, oldest);
+            oldest_age = select_unpredictable(is_older, age, oldest_age);
         }
         oldest
     }

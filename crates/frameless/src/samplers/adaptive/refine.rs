@@ -26,7 +26,7 @@ use super::order::Order;
 use super::shares::Shares;
 use super::tiles::Tiles;
 use crate::rates::Rates;
-use crate::tile::{TileGrid, TileRect};
+use crate::tile::{LINE, PerTile, TileGrid, TileRect};
 use crate::{Canvas, Refinement, Request, Rng, wide};
 
 /// ε: the least part of the samples that look for change, however still the picture is.
@@ -48,7 +48,9 @@ pub(crate) struct Refine {
     behind: Behind,
     /// Σ σ².
     variance_sum: f64,
-    /// By u m σ^(1+b), with u as the even part.
+    /// u m σ^(1+b).
+    weights: PerTile,
+    /// By these, with u as the even part.
     shares: Shares,
     order: Order,
     /// Whose turn it is, tile by tile.
@@ -181,6 +183,7 @@ impl Refine {
             tiles: vec![unknown; tiles],
             behind: Behind::Alike,
             variance_sum: f64::from(FIRST_VARIANCE) * tiles as f64,
+            weights: PerTile::new(tiles),
             shares: Shares::new(tiles, rng),
             order: Order::new(),
             turns: (0..tiles).map(|_| Order::begin(rng)).collect(),
@@ -249,10 +252,11 @@ impl Refine {
 
     /// What tiles count has changed.
     pub(crate) fn weigh_all(&mut self, m: impl Fn(usize) -> f32) {
-        let share = |tile: usize| {
-            (self.tiles[tile].weight(m(tile), self.behind), self.tiles[tile].unfinished)
-        };
-        self.shares.set_all(share);
+        for (tile, noise) in self.tiles.iter().enumerate() {
+            *self.weights.of_mut(tile) = noise.weight(m(tile), self.behind);
+        }
+        self.shares.set_evens(|tile| self.tiles[tile].unfinished);
+        self.shares.weigh_all(&self.weights);
     }
 
     /// The part of the samples that look for change.
@@ -277,15 +281,15 @@ impl Refine {
         let change = part * (refinement.deviation - noise.variance);
         noise.variance += change;
         self.variance_sum += f64::from(change);
-        let weight = noise.weight(m, self.behind);
-        self.shares.set(tile, weight);
+        *self.weights.of_mut(tile) = noise.weight(m, self.behind);
+        self.shares.touch(tile);
     }
 
     /// Begin to fetch what [`Refine::observe`] changes.
     #[inline]
     pub(crate) fn prefetch(&self, tile: usize) {
         wide::prefetch(&self.tiles, tile);
-        self.shares.prefetch(tile);
+        self.weights.prefetch(tile / LINE);
     }
 
     /// Gives out about `count` samples; exactly on average.
@@ -298,6 +302,7 @@ impl Refine {
     ) {
         let mean = (self.variance_sum / self.tiles.len() as f64).max(0.0) as f32;
         let evenly = EVENLY * self.behind.power(mean.sqrt()) + 1e-6;
+        self.shares.renew(&self.weights);
         let sums = self.shares.sums();
         let sum = sums.weight as f32 + evenly * sums.even as f32;
         if sum <= 0.0 {
@@ -305,7 +310,7 @@ impl Refine {
         }
         let mut drawn = std::mem::take(&mut self.drawn);
         drawn.clear();
-        self.shares.draw(count / sum, evenly * count / sum, &mut drawn);
+        self.shares.draw(count / sum, evenly * count / sum, &self.weights, &mut drawn);
         for &tile in &drawn {
             let within = self.order.peek(self.turns[tile as usize]);
             let pixel = (grid.corner(tile as usize) + grid.step(within)) as usize;

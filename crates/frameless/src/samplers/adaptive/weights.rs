@@ -88,6 +88,12 @@ impl TileWeights {
         self.tile.get(tile).copied().unwrap_or(1.0)
     }
 
+    /// m of all tiles; empty: all are 1.
+    #[inline]
+    pub(crate) fn of_tiles(&self) -> &[f32] {
+        &self.tile
+    }
+
     /// Looks at the canvas anew, after a reconstruction has said what its tiles show. Whether any m may have changed.
     pub(crate) fn look(&mut self, canvas: &Canvas, grid: &TileGrid) -> bool {
         if self.contrast == 0.0 && self.flow == 0.0 {
