@@ -41,7 +41,7 @@ impl Default for Evidence {
 
 impl Evidence {
     /// Of a change, d, of what was `age_secs` old. `weight`: below 1 for samples that were not chosen evenly over the tile. Returns v.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn observe(&mut self, change: f32, age_secs: f32, weight: f32) -> f32 {
         self.change = MEMORY * self.change + weight * change * (1.0 / 3.0);
         self.age_secs = MEMORY * self.age_secs + weight * age_secs.max(SHORTEST_AGE_SECS);
@@ -56,13 +56,13 @@ impl Rates {
     }
 
     /// v of a tile is another one now. Returns what it was.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn set(&mut self, tile: usize, rate: f32) -> f32 {
         std::mem::replace(self.tiles.of_mut(tile), rate)
     }
 
     /// v of a tile: squared error per channel and second.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn of_tile(&self, tile: usize) -> f32 {
         self.tiles.of(tile)
     }
@@ -74,7 +74,7 @@ impl Rates {
     }
 
     /// Begin to fetch what is known of a tile.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn prefetch(&self, tile: usize) {
         self.tiles.prefetch(tile / LINE);
     }

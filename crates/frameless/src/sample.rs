@@ -55,6 +55,7 @@ pub struct Request {
 
 impl Request {
     /// A ray through the pixel's centre: number 0 of its sequence.
+    #[inline]
     pub fn centre(pixel: u32) -> Request {
         Request { pixel, offset: [0.0; 2], sample_index: 0 }
     }

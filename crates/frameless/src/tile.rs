@@ -116,7 +116,7 @@ impl TileGrid {
     }
 
     /// A bit for every pixel of a tile of 8×8, row by row: set where there is one.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn pixels_of(&self, tile: usize) -> u64 {
         if self.is_whole() {
             return u64::MAX;

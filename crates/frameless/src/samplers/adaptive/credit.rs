@@ -18,9 +18,10 @@ use super::shares::{Shares, Weigh};
 use super::tiles::{Tile, Tiles};
 use super::why::Why;
 use crate::rates::Rates;
-use crate::traced::{Mark, Place, TILE_PIXELS};
-use crate::wide::{self, F8, Unit};
-use crate::{Canvas, Rng, Time};
+use crate::tile::TileGrid;
+use crate::traced::{Mark, Place, TILE_PIXELS, TileMarks};
+use crate::wide::{self, F8, Task, Unit};
+use crate::{Canvas, Request, Rng, Time};
 
 /// ε: the part of the samples that is spread evenly over the picture, so that every pixel has a floor frequency.
 const EVENLY: f32 = 0.2;
@@ -91,7 +92,7 @@ impl Credit {
     }
 
     /// A tile's v has changed.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn touch(&mut self, tile: usize) {
         self.shares.touch(tile);
     }
@@ -119,15 +120,33 @@ impl Credit {
         weights: &ByRate,
         tiles: &mut Tiles,
         [count, least_even]: [f32; 2],
-        mut take: impl FnMut(u32),
+        requests: &mut Vec<Request>,
     ) {
         self.shares.renew(weights);
         let (a, b) = self.scale(count, least_even);
+        self.drawn.clear();
+        self.shares.draw(a, b, weights, &mut self.drawn);
+        let Credit { order, drawn, .. } = self;
         let (marks, now) = (canvas.traced().tiles(), Mark::at(now));
-        let grid = &weights.rates.grid;
-        let Credit { shares, order, drawn, .. } = self;
-        drawn.clear();
-        shares.draw(a, b, weights, drawn);
+        wide::run(Look { order, drawn, marks, now, grid: &weights.rates.grid, tiles, requests });
+    }
+}
+
+/// Looks for the next pixel of every tile that is drawn.
+struct Look<'a> {
+    order: &'a mut Order,
+    drawn: &'a [u32],
+    marks: &'a [TileMarks],
+    now: Mark,
+    grid: &'a TileGrid,
+    tiles: &'a mut Tiles,
+    requests: &'a mut Vec<Request>,
+}
+
+impl Task for Look<'_> {
+    #[inline(always)]
+    fn run<U: Unit>(self) {
+        let Look { order, drawn, marks, now, grid, tiles, requests } = self;
         // What is looked at lies all over the picture: it is fetched before, tile by tile and then a few tiles' marks.
         drawn.iter().for_each(|&tile| tiles.prefetch(tile as usize));
         for few in drawn.chunks(FEW) {
@@ -144,7 +163,7 @@ impl Credit {
                 let enough = order::enough(*mean_age_secs);
                 let within = order.old_enough(now, marks, pixels, turn, enough);
                 reasons.set(1 << within, Why::Tile);
-                take(grid.pixel(Place(TILE_PIXELS * tile + within)));
+                requests.push(Request::centre(grid.pixel(Place(TILE_PIXELS * tile + within))));
             }
         }
     }

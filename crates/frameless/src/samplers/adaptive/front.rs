@@ -68,7 +68,7 @@ pub(super) struct TileFront {
 
 impl TileFront {
     /// A pixel has just been traced.
-    #[inline]
+    #[inline(always)]
     pub(super) fn traced(&mut self, within: usize) {
         self.beside &= !(1 << within);
     }
@@ -150,7 +150,7 @@ impl Front {
     }
 
     /// A sample that was traced, and may be part of a front. Late looks are not.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn hear(&mut self, observed: &Observation, place: Place, why: Why) {
         // Written in any case, so that nobody has to guess who is.
         self.changed[self.parts] = (place, Mark::at(observed.now));
@@ -197,7 +197,7 @@ impl Front {
         count
     }
 
-    #[inline]
+    #[inline(always)]
     fn wait(&mut self, tile: usize, front: &mut TileFront) {
         if !front.waits {
             front.waits = true;

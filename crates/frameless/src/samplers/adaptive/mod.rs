@@ -30,6 +30,7 @@ use std::collections::VecDeque;
 use crate::rates::Rates;
 use crate::tile::TileGrid;
 use crate::traced::Place;
+use crate::wide::{self, Task, Unit};
 use crate::{Canvas, Insight, Observation, Refinement, Request, Rng, Sampler, Time, Weights};
 use credit::{ByRate, Credit};
 use front::Front;
@@ -239,7 +240,7 @@ fn wanted(temporal: f32) -> f32 {
 /// Learning.
 impl State {
     /// Begin to fetch what an observation will change.
-    #[inline]
+    #[inline(always)]
     fn fetch(&self, observed: &Observation, tile: usize) {
         if observed.refinement.is_some() {
             self.refine.prefetch(tile);
@@ -257,7 +258,7 @@ impl State {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn observe_sample(&mut self, observed: &Observation, place: Place) {
         let number = place.tile();
         let tile = self.tiles.of_mut(number);
@@ -279,6 +280,37 @@ impl State {
         self.credit.touch(number);
         self.hot += usize::from(after > HOT_RATE);
         self.hot -= usize::from(before > HOT_RATE);
+    }
+}
+
+/// See [`Sampler::observe`].
+struct Hear<'a> {
+    state: &'a mut State,
+    canvas: &'a Canvas,
+    observations: &'a [Observation],
+}
+
+impl Task for Hear<'_> {
+    #[inline(always)]
+    fn run<U: Unit>(self) {
+        let Hear { state, canvas, observations } = self;
+        let mut places = [Place::default(); FEW];
+        for few in observations.chunks(FEW) {
+            // What will be changed is fetched before, all over the picture.
+            for (place, observed) in places.iter_mut().zip(few) {
+                *place = state.rates.grid.place(observed.pixel);
+                state.fetch(observed, place.tile());
+            }
+            for (&place, observed) in places.iter().zip(few) {
+                match &observed.refinement {
+                    None => state.observe_sample(observed, place),
+                    Some(refinement) => {
+                        let n = canvas.samples()[observed.pixel as usize];
+                        state.observe_refinement(place, n, refinement);
+                    }
+                }
+            }
+        }
     }
 }
 
@@ -318,9 +350,7 @@ impl Sampler for Adaptive {
         let rest = count as f32 - (before - start) as f32;
         let counts = [rest + *owed, LEAST_EVEN * left];
         let weights = ByRate { rates, m: weights.of_tiles() };
-        credit.draw(now, canvas, &weights, tiles, counts, |pixel| {
-            requests.push(Request::centre(pixel));
-        });
+        credit.draw(now, canvas, &weights, tiles, counts, requests);
         *owed += rest - (requests.len() - before) as f32;
     }
 
@@ -330,23 +360,7 @@ impl Sampler for Adaptive {
             return;
         };
         state.front.expect(observations.len());
-        let mut places = [Place::default(); FEW];
-        for few in observations.chunks(FEW) {
-            // What will be changed is fetched before, all over the picture.
-            for (place, observed) in places.iter_mut().zip(few) {
-                *place = state.rates.grid.place(observed.pixel);
-                state.fetch(observed, place.tile());
-            }
-            for (&place, observed) in places.iter().zip(few) {
-                match &observed.refinement {
-                    None => state.observe_sample(observed, place),
-                    Some(refinement) => {
-                        let n = canvas.samples()[observed.pixel as usize];
-                        state.observe_refinement(place, n, refinement);
-                    }
-                }
-            }
-        }
+        wide::run(Hear { state, canvas, observations });
         if state.front_share > 0.0 {
             state.front.observe(&mut state.tiles, canvas);
         }

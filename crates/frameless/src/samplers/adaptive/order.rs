@@ -105,7 +105,7 @@ impl Order {
 }
 
 /// The age from which on pixels of a tile are old enough, in half ticks: half their mean age.
-#[inline]
+#[inline(always)]
 pub(super) fn enough(mean_age_secs: f32) -> f32 {
     // Not as a whole number: to be made one it would have to be asked whether it is one.
     0.5 * HALF_TICKS_PER_SEC * mean_age_secs

@@ -167,7 +167,7 @@ impl Shares {
     }
 
     /// w of a tile is another one now; [`Shares::renew`] is to be called before anything is drawn.
-    #[inline]
+    #[inline(always)]
     pub(super) fn touch(&mut self, tile: usize) {
         let block = tile / BLOCK;
         // Written in any case, so that nobody has to guess whether it has been already.

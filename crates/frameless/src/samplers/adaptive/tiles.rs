@@ -50,13 +50,13 @@ impl Tiles {
     }
 
     /// Why a pixel is asked for.
-    #[inline]
+    #[inline(always)]
     pub(super) fn set_why(&mut self, place: Place, why: Why) {
         self.of_mut(place.tile()).reasons.set(1 << place.within(), why);
     }
 
     /// Begins to fetch a tile.
-    #[inline]
+    #[inline(always)]
     pub(super) fn prefetch(&self, tile: usize) {
         wide::prefetch(&self.0, tile);
     }
@@ -64,7 +64,7 @@ impl Tiles {
 
 impl Tile {
     /// Of a sample that replaced one of this age.
-    #[inline]
+    #[inline(always)]
     pub(super) fn observe_age(&mut self, age_secs: f32) {
         self.mean_age_secs += LAST_AGE * (age_secs - self.mean_age_secs);
     }

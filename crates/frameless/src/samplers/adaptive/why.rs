@@ -15,7 +15,7 @@ pub(super) struct Reasons([u64; 2]);
 
 impl Reasons {
     /// Of the pixel at a place `within` the tile.
-    #[inline]
+    #[inline(always)]
     pub(super) fn of(self, within: usize) -> Why {
         let [low, high] = self.0.map(|bits| bits >> within & 1);
         match low | high << 1 {
@@ -27,7 +27,7 @@ impl Reasons {
     }
 
     /// Of all pixels whose bits are set.
-    #[inline]
+    #[inline(always)]
     pub(super) fn set(&mut self, pixels: u64, why: Why) {
         let (low, high) = ((why as u64 & 1).wrapping_neg(), (why as u64 >> 1).wrapping_neg());
         let [lower, upper] = &mut self.0;
