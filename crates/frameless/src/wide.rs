@@ -326,6 +326,12 @@ impl<U: Unit> M8<U> {
         U::bits(self.0)
     }
 
+    /// A bit per lane, set where it is negative as a signed number.
+    #[inline(always)]
+    pub(crate) fn signs(self) -> u32 {
+        U::bits(self.0)
+    }
+
     /// Whether all lanes of a mask are set.
     #[inline(always)]
     pub(crate) fn all(self) -> bool {

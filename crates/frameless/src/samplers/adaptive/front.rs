@@ -287,7 +287,7 @@ impl Task for LookAtNear<'_> {
             let mut young = 0;
             for row in 0..3 {
                 let since = latest.minus(M8::load(marks, 8 * (first + row)));
-                young |= u64::from(since.less_than(M8::splat(0)).bits()) << (8 * row);
+                young |= u64::from(since.signs()) << (8 * row);
             }
             let stale = pixels & !(young << (8 * first));
             let front = &mut tiles.of_mut(tile as usize).front;
