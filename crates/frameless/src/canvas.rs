@@ -98,7 +98,7 @@ impl Canvas {
     }
 
     #[inline(always)]
-    fn mark(&self, pixel: u32) -> Mark {
+    pub(crate) fn mark(&self, pixel: u32) -> Mark {
         self.traced.mark(self.traced.place(pixel))
     }
 

@@ -9,17 +9,20 @@
 //! are shown half an interval late on average; just before the refresh, hardly at all. Errors that were found so say nothing of how
 //! fast the rest of their tile changes, and what is beside them is looked at as well: they teach no rates and begin no fronts.
 
+use crate::traced::Mark;
 use crate::{Canvas, Time};
 
 /// The largest part of a batch that late looks get, of what holes and fronts leave.
 const SHARE: f32 = 0.4;
 /// The largest part of the time between two refreshes that they take.
 const LONGEST: f64 = 0.5;
+/// So many pixels later what is fetched is looked at.
+const AHEAD: usize = 32;
 
 /// Where in the list of pixels, and when it began.
 pub(super) struct Late {
     next: usize,
-    begun: Option<Time>,
+    begun: Option<Mark>,
     /// The last refreshes, the newest first.
     shown_at: [Time; 3],
     last_batch: Time,
@@ -51,11 +54,14 @@ impl Late {
         if most == 0 || !self.is_time(now, canvas.last_minute().len().div_ceil(most), batch_secs) {
             return;
         }
-        let begun = *self.begun.get_or_insert(now.as_kept());
+        let begun = *self.begun.get_or_insert(Mark::at(now));
         while most > 0 {
             let Some(&pixel) = canvas.last_minute().get(self.next) else { return };
             self.next += 1;
-            if canvas.time_of(pixel) < begun {
+            if let Some(&later) = canvas.last_minute().get(self.next + AHEAD) {
+                canvas.traced().prefetch(canvas.traced().place(later));
+            }
+            if begun.since(canvas.mark(pixel)) > 0 {
                 take(pixel);
                 most -= 1;
             }

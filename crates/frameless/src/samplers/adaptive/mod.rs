@@ -55,7 +55,7 @@ const HOT_RATE: f32 = 0.01;
 const HOT_PART: f32 = 0.2;
 
 /// How many holes ahead of the one at hand the next is fetched from memory: enough for a few dozen nanoseconds each.
-const AHEAD: usize = 12;
+const AHEAD: usize = 32;
 /// What so many observations change is fetched at once.
 const FEW: usize = 64;
 
@@ -163,7 +163,9 @@ impl State {
             let Some(&pixel) = canvas.holes().get(self.next_hole) else { break };
             self.next_hole += 1;
             if let Some(&later) = canvas.holes().get(self.next_hole + AHEAD) {
-                canvas.traced().prefetch(self.rates.grid.place(later));
+                let place = self.rates.grid.place(later);
+                canvas.traced().prefetch(place);
+                self.tiles.prefetch(place.tile());
             }
             if canvas.still_waits(pixel) {
                 match self.weights.lets_pass(&self.rates.grid, pixel) {
