@@ -29,6 +29,8 @@ const MOST_AT_ONCE: f64 = 2.0;
 
 /// How many tiles ahead of the one looked at the next is fetched.
 const AHEAD: usize = 32;
+/// So many changes are looked at together.
+const MANY: usize = 1024;
 
 /// Pixels beside changes, tile by tile.
 pub(crate) struct Front {
@@ -160,41 +162,15 @@ impl Front {
     /// The neighbours of samples that are part of a front wait from now on.
     pub(crate) fn observe(&mut self, tiles: &mut Tiles, canvas: &Canvas) {
         let (traced, fresh) = (canvas.traced(), half_ticks(self.fresh_secs));
-        let count = self.find_near(traced.grid());
-        let begin_to_wait = &mut self.begin_to_wait;
-        begin_to_wait.resize(count.max(begin_to_wait.len()), 0);
-        let mut waiting = 0;
-        let near = &self.near[..count];
-        wide::run(LookAtNear { near, traced, fresh, tiles, begin_to_wait, waiting: &mut waiting });
-        self.waiting.extend(&self.begin_to_wait[..waiting]);
-    }
-
-    /// What is beside changes, tile by tile. Returns how many there are.
-    fn find_near(&mut self, grid: &TileGrid) -> usize {
-        let (changed, near) = (&self.changed[..self.parts], &mut self.near);
-        near.resize((4 * changed.len()).max(near.len()), Near::default());
-        let mut count = 0;
-        for &(place, found) in changed {
-            let Beside { own, others: [beside, beyond, corner], step: [dx, dy] } =
-                BESIDE[place.within()];
-            let (tile, [column, row]) = (place.tile() as u32, grid.column_and_row(place.tile()));
-            let across = (dx != 0) & (column.wrapping_add_signed(dx) < grid.columns);
-            let down = (dy != 0) & (row.wrapping_add_signed(dy) < grid.rows);
-            let (side, other) = (tile.wrapping_add_signed(dx), dy * grid.columns as i32);
-            // Written in any case, so that nobody has to guess which there are.
-            let four = near[count..].first_chunk_mut::<4>().expect("room for four each");
-            let mut next = 0;
-            let mut put = |tile: u32, pixels: u64, is_there: bool| {
-                four[next] = Near { tile, found, pixels };
-                next += usize::from(is_there);
-            };
-            put(tile, own, true);
-            put(side, beside, across);
-            put(tile.wrapping_add_signed(other), beyond, down);
-            put(side.wrapping_add_signed(other), corner, across & down);
-            count += next;
+        let Front { changed, parts, near, begin_to_wait, waiting, .. } = self;
+        for changed in changed[..*parts].chunks(MANY) {
+            let count = find_near(changed, traced.grid(), near);
+            let near = &near[..count];
+            begin_to_wait.resize(count.max(begin_to_wait.len()), 0);
+            let mut begin = 0;
+            wide::run(LookAtNear { near, traced, fresh, tiles, begin_to_wait, count: &mut begin });
+            waiting.extend(&begin_to_wait[..begin]);
         }
-        count
     }
 
     #[inline(always)]
@@ -253,6 +229,33 @@ impl Front {
     }
 }
 
+/// What is beside changes, tile by tile. Returns how many there are.
+fn find_near(changed: &[(Place, Mark)], grid: &TileGrid, near: &mut Vec<Near>) -> usize {
+    near.resize((4 * changed.len()).max(near.len()), Near::default());
+    let mut count = 0;
+    for &(place, found) in changed {
+        let Beside { own, others: [beside, beyond, corner], step: [dx, dy] } =
+            BESIDE[place.within()];
+        let (tile, [column, row]) = (place.tile() as u32, grid.column_and_row(place.tile()));
+        let across = (dx != 0) & (column.wrapping_add_signed(dx) < grid.columns);
+        let down = (dy != 0) & (row.wrapping_add_signed(dy) < grid.rows);
+        let (side, other) = (tile.wrapping_add_signed(dx), dy * grid.columns as i32);
+        // Written in any case, so that nobody has to guess which there are.
+        let four = near[count..].first_chunk_mut::<4>().expect("room for four each");
+        let mut next = 0;
+        let mut put = |tile: u32, pixels: u64, is_there: bool| {
+            four[next] = Near { tile, found, pixels };
+            next += usize::from(is_there);
+        };
+        put(tile, own, true);
+        put(side, beside, across);
+        put(tile.wrapping_add_signed(other), beyond, down);
+        put(side.wrapping_add_signed(other), corner, across & down);
+        count += next;
+    }
+    count
+}
+
 /// Finds the tiles that begin to wait.
 struct LookAtNear<'a> {
     near: &'a [Near],
@@ -262,15 +265,15 @@ struct LookAtNear<'a> {
     tiles: &'a mut Tiles,
     /// As many as there are in `near`.
     begin_to_wait: &'a mut [u32],
-    /// How many of them are.
-    waiting: &'a mut usize,
+    /// How many of them do.
+    count: &'a mut usize,
 }
 
 impl Task for LookAtNear<'_> {
     /// Those that were traced `fresh` before the change was found, or earlier.
     #[inline(always)]
     fn run<U: Unit>(self) {
-        let LookAtNear { near, traced, fresh, tiles, begin_to_wait, waiting } = self;
+        let LookAtNear { near, traced, fresh, tiles, begin_to_wait, count } = self;
         let first_row = |pixels: u64| (pixels.trailing_zeros() / 8).min(5) as usize;
         for (i, &Near { tile, found, pixels }) in near.iter().enumerate() {
             if let Some(later) = near.get(i + AHEAD) {
@@ -293,8 +296,8 @@ impl Task for LookAtNear<'_> {
             let front = &mut tiles.of_mut(tile as usize).front;
             front.beside |= stale;
             // Neither is it guessed who begins to wait.
-            begin_to_wait[*waiting] = tile;
-            *waiting += usize::from((stale != 0) & !front.waits);
+            begin_to_wait[*count] = tile;
+            *count += usize::from((stale != 0) & !front.waits);
             front.waits |= stale != 0;
         }
     }
