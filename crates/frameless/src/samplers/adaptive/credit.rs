@@ -152,9 +152,7 @@ impl Task for Look<'_> {
         for few in drawn.chunks(FEW) {
             for &tile in few {
                 let (tile, turn) = (tile as usize, tiles.of(tile as usize).turn);
-                // A tile's pixels in their order are in two of its four lines by turns.
                 wide::prefetch(marks[tile].0.as_slice(), order.peek(turn));
-                wide::prefetch(marks[tile].0.as_slice(), order.peek(turn.wrapping_add(1)));
             }
             for &tile in few {
                 let tile = tile as usize;
