@@ -1,5 +1,7 @@
 //! `frameless info`: what is in a scene.
 
+use std::collections::HashSet;
+
 use frameless_scene::{
     AfterEnd, Camera, Geometry, Image, Influences, Light, LightKind, Mesh, MorphTarget, Projection,
     Scene, Target,
@@ -52,6 +54,7 @@ fn parts(what: &str, names: &[String], used: &str, which: &[usize]) -> Vec<Strin
         return Vec::new();
     }
     let mut lines = vec![format!("{what:<12}{}", names.len())];
+    let which: HashSet<usize> = which.iter().copied().collect();
     let line = |(index, name): (usize, &String)| {
         let mark = if which.contains(&index) { format!(", {used}") } else { String::new() };
         item(index, &format!("{name:?}{mark}"))

@@ -12,6 +12,8 @@ pub(super) struct Accessor<'a> {
     pub(super) component: Component,
     /// Components per element: 1 (SCALAR) to 16 (MAT4).
     pub(super) width: usize,
+    /// As in the file: SCALAR to MAT4.
+    kind: &'static str,
     pub(super) pointer: String,
     /// Integers stand for fractions in [0, 1] or [−1, 1].
     normalized: bool,
@@ -67,6 +69,17 @@ impl Component {
         }
     }
 
+    fn number_in_file(self) -> u32 {
+        match self {
+            Component::I8 => 5120,
+            Component::U8 => 5121,
+            Component::I16 => 5122,
+            Component::U16 => 5123,
+            Component::U32 => 5125,
+            Component::F32 => 5126,
+        }
+    }
+
     fn bytes(self) -> usize {
         match self {
             Component::I8 | Component::U8 => 1,
@@ -115,8 +128,7 @@ pub(super) fn parse_accessors<'a>(
 impl<'a> Accessor<'a> {
     fn parse(json: &Json<'_>, views: &[View<'a>]) -> Result<Accessor<'a>, Fault> {
         let component = Component::parse(&json.required("componentType")?)?;
-        let kind = json.required("type")?;
-        let (width, bytes) = element_size(&kind, component)?;
+        let (kind, width, bytes) = element_size(&json.required("type")?, component)?;
         let count_json = json.required("count")?;
         let count = count_json.unsigned()?;
         let dense = match json.field("bufferView")? {
@@ -133,10 +145,30 @@ impl<'a> Accessor<'a> {
         };
         let normalized = json.flag("normalized")?;
         let pointer = json.pointer().to_owned();
-        Ok(Accessor { count, component, width, pointer, normalized, dense, sparse })
+        Ok(Accessor { count, component, width, kind, pointer, normalized, dense, sparse })
     }
 
-    /// The elements as `N` numbers each, integers converted; numbers may be infinite or NaN.
+    /// Refuses elements of other kinds than `user` can use, where they are used.
+    pub(super) fn check_kind(&self, kinds: &[&str], user: &Json<'_>) -> Result<(), Fault> {
+        if kinds.contains(&self.kind) {
+            return Ok(());
+        }
+        let kinds = kinds.join(" or ");
+        let components = match kinds.as_str() {
+            "SCALAR" => "1 component",
+            "VEC2" => "2 components",
+            "VEC3" => "3 components",
+            "VEC4" => "4 components",
+            "MAT4" => "16 components",
+            "VEC3 or VEC4" => "3 or 4 components",
+            _ => "other components",
+        };
+        let came = format!("{} of {}", self.kind, self.pointer);
+        Err(Fault::at(user.pointer(), format!("{components} per element ({kinds})"), came))
+    }
+
+    /// The elements as `N` numbers each, integers converted; numbers may be infinite or NaN. Their kind should have been
+    /// [checked](Accessor::check_kind).
     pub(super) fn numbers<const N: usize>(
         &self,
         budget: &mut Budget,
@@ -154,34 +186,43 @@ impl<'a> Accessor<'a> {
 
     /// The elements as unsigned numbers, as primitives index vertices.
     pub(super) fn indices(&self, budget: &mut Budget) -> Result<Vec<u32>, Fault> {
-        self.refuse_as_indices()?;
         self.elements(budget, |bytes| self.component.whole(bytes))
     }
 
     /// The highest of them, if they are all stored as they are: neither zeros nor sparse.
-    pub(super) fn highest_stored_index(&self) -> Result<Option<u32>, Fault> {
-        self.refuse_as_indices()?;
-        let Some(dense) = self.dense.filter(|_| self.sparse.is_none()) else { return Ok(None) };
-        Ok((0..self.count).map(|i| self.component.whole(dense.element(i))).max())
+    pub(super) fn highest_stored_index(&self) -> Option<u32> {
+        let dense = self.dense.filter(|_| self.sparse.is_none())?;
+        (0..self.count).map(|i| self.component.whole(dense.element(i))).max()
     }
 
-    fn refuse_as_indices(&self) -> Result<(), Fault> {
+    /// Refuses what cannot be the indices of `user`.
+    pub(super) fn check_indices(&self, user: &Json<'_>) -> Result<(), Fault> {
         let component = self.component;
         let unsigned = matches!(component, Component::U8 | Component::U16 | Component::U32);
-        if self.width == 1 && unsigned {
+        if self.kind == "SCALAR" && unsigned {
             return Ok(());
         }
-        let came = format!("{} × {component:?}", self.width);
-        Err(Fault::at(&self.pointer, "unsigned scalars as indices", came))
+        Err(self.is_other(user, "unsigned scalars (5121, 5123 or 5125) as indices"))
     }
 
-    /// The elements as four joint numbers each.
+    /// Refuses what cannot be joint numbers.
+    pub(super) fn check_joints(&self, user: &Json<'_>) -> Result<(), Fault> {
+        let fits = matches!(self.component, Component::U8 | Component::U16);
+        if self.kind == "VEC4" && fits {
+            return Ok(());
+        }
+        Err(self.is_other(user, "VEC4 of 5121 or 5123 as joints"))
+    }
+
+    fn is_other(&self, user: &Json<'_>, wanted: &str) -> Fault {
+        let came =
+            format!("{} of {} in {}", self.kind, self.component.number_in_file(), self.pointer);
+        Fault::at(user.pointer(), wanted, came)
+    }
+
+    /// The elements as four joint numbers each; [checked](Accessor::check_joints).
     pub(super) fn joints(&self, budget: &mut Budget) -> Result<Vec<[u16; 4]>, Fault> {
         let component = self.component;
-        if self.width != 4 || !matches!(component, Component::U8 | Component::U16) {
-            let came = format!("{} × {component:?}", self.width);
-            return Err(Fault::at(&self.pointer, "VEC4 of 5121 or 5123 as joints", came));
-        }
         let step = component.bytes();
         let read =
             |bytes: &[u8]| std::array::from_fn(|k| component.whole(&bytes[k * step..]) as u16);
@@ -243,8 +284,13 @@ impl<'a> Sparse<'a> {
 
     fn replace<T>(&self, elements: &mut [T], read: impl Fn(&[u8]) -> T) -> Result<(), Fault> {
         let count = elements.len();
+        let mut last = None;
         for i in 0..self.count {
             let index = self.index_component.whole(self.indices.element(i));
+            if let Some(last) = last.replace(index).filter(|&last| last >= index) {
+                let came = format!("{index} after {last}");
+                return Err(Fault::at(&self.pointer, "indices each higher than the last", came));
+            }
             let Some(element) = elements.get_mut(index as usize) else {
                 return Err(Fault::at(&self.pointer, format!("indices below {count}"), index));
             };
@@ -254,21 +300,24 @@ impl<'a> Sparse<'a> {
     }
 }
 
-/// Components and bytes per element. Columns of matrices begin at multiples of four bytes (glTF 2.0 §3.6.2.4).
-fn element_size(kind: &Json<'_>, component: Component) -> Result<(usize, usize), Fault> {
+/// Kind, components and bytes of an element. Columns of matrices begin at multiples of four bytes (glTF 2.0 §3.6.2.4).
+fn element_size(
+    json: &Json<'_>,
+    component: Component,
+) -> Result<(&'static str, usize, usize), Fault> {
     let bytes = component.bytes();
-    let (rows, columns) = match kind.text()? {
-        "SCALAR" => (1, 1),
-        "VEC2" => (2, 1),
-        "VEC3" => (3, 1),
-        "VEC4" => (4, 1),
-        "MAT2" => (2, 2),
-        "MAT3" => (3, 3),
-        "MAT4" => (4, 4),
-        _ => return Err(kind.fault("SCALAR, VEC2, VEC3, VEC4, MAT2, MAT3 or MAT4")),
+    let (kind, rows, columns) = match json.text()? {
+        "SCALAR" => ("SCALAR", 1, 1),
+        "VEC2" => ("VEC2", 2, 1),
+        "VEC3" => ("VEC3", 3, 1),
+        "VEC4" => ("VEC4", 4, 1),
+        "MAT2" => ("MAT2", 2, 2),
+        "MAT3" => ("MAT3", 3, 3),
+        "MAT4" => ("MAT4", 4, 4),
+        _ => return Err(json.fault("SCALAR, VEC2, VEC3, VEC4, MAT2, MAT3 or MAT4")),
     };
     let column_bytes = if columns > 1 { (rows * bytes).next_multiple_of(4) } else { rows * bytes };
-    Ok((rows * columns, column_bytes * columns))
+    Ok((kind, rows * columns, column_bytes * columns))
 }
 
 /// `count` elements of `bytes` each in `view`, from `offset` on.
@@ -291,7 +340,12 @@ fn strided<'a>(
     };
     let bytes = length.and_then(|length| slice(view.bytes, offset, length)).ok_or_else(|| {
         let size = view.bytes.len();
-        count_json.fault(format!("elements within the view of {size} bytes, from byte {offset}"))
+        let needed = length.map_or("more bytes than there are numbers".to_owned(), |length| {
+            format!("{length} bytes")
+        });
+        count_json.fault(format!(
+            "elements within the view of {size} bytes, from byte {offset} (so many need {needed})"
+        ))
     })?;
     Ok(Strided { bytes, stride })
 }

@@ -15,20 +15,23 @@ use super::instances::WeightsOfNode;
 use super::json::Json;
 use super::node::{Hierarchy, unit};
 
-/// All motion of the scene's nodes; says in `contents` which animations that is.
+/// Per node of the scene that moves: the number of the file's animation that moves it first.
+pub(super) type Movers = HashMap<u32, usize>;
+
+/// All motion of the scene's nodes, and by what; says in `contents` which animations that is.
 pub(super) fn load_animation(
     document: &mut Document<'_>,
     nodes: &Nodes<'_>,
     choice: &AnimationChoice,
     contents: &mut Contents,
-) -> Result<Animation, Fault> {
+) -> Result<(Animation, Movers), Fault> {
     let list = document.root.list("animations")?;
     let mut parsed = Vec::new();
     for json in &list {
         parsed.push(parse_animation(json, document, nodes)?);
     }
     contents.played = played(&list, &parsed, choice, document)?;
-    let mut animation = Animation::default();
+    let (mut animation, mut movers) = (Animation::default(), Movers::new());
     let mut driven = HashSet::new();
     for &number in &contents.played {
         let owner = list[number].called("animation");
@@ -39,11 +42,17 @@ pub(super) fn load_animation(
                 continue;
             }
             keys.add_channels(sampler, what, &owner, document, &mut animation.channels)?;
+            if let What::Node(
+                Target::Translation(node) | Target::Rotation(node) | Target::Scale(node),
+            ) = what
+            {
+                movers.entry(*node).or_insert(number);
+            }
         }
     }
     let last_keys = animation.channels.iter().filter_map(|channel| channel.times.last());
     animation.duration_secs = last_keys.fold(0.0, |longest, &secs| longest.max(f64::from(secs)));
-    Ok(animation)
+    Ok((animation, movers))
 }
 
 /// The nodes that may be moved.
@@ -143,7 +152,9 @@ fn load_keys(json: &Json<'_>, document: &mut Document<'_>) -> Result<Keys, Fault
         },
     };
     let accessors = &document.accessors;
-    let input = json.required("input")?.index(accessors.len(), "accessors")?;
+    let input_json = json.required("input")?;
+    let input = input_json.index(accessors.len(), "accessors")?;
+    accessors[input].check_kind(&["SCALAR"], &input_json)?;
     let output = json.required("output")?.index(accessors.len(), "accessors")?;
     document.budget.add_keyframes(json.pointer(), accessors[input].count)?;
     let times = accessors[input].numbers::<1>(&mut document.budget)?;
@@ -201,7 +212,14 @@ impl Keys {
             What::Node(_) => self.per_key(),
             What::Weights(weights) => self.per_key() * weights.len(),
         };
-        let came = document.accessors[self.output].count;
+        let output = &document.accessors[self.output];
+        let kind = match what {
+            What::Node(Target::Rotation(_)) => "VEC4",
+            What::Node(_) => "VEC3",
+            What::Weights(_) => "SCALAR",
+        };
+        output.check_kind(&[kind], sampler)?;
+        let came = output.count;
         if self.times.len().checked_mul(per_key) == Some(came) {
             return Ok(());
         }
@@ -248,6 +266,7 @@ impl Keys {
                 let all = output.numbers::<1>(budget)?;
                 // Every weight becomes a channel of its own, with the times of all.
                 budget.allocate(sampler.pointer(), all.len(), 2 * size_of::<f32>())?;
+                budget.allocate(sampler.pointer(), weights.len(), BYTES_PER_CHANNEL)?;
                 for (place, weight) in weights.clone().enumerate() {
                     let mut values: Vec<[f32; 1]> =
                         all.iter().skip(place).step_by(weights.len()).copied().collect();
@@ -280,6 +299,9 @@ impl Keys {
         (times.len(), times)
     }
 }
+
+/// Itself, and what its two arrays take besides their numbers.
+const BYTES_PER_CHANNEL: usize = size_of::<Channel>() + 64;
 
 fn is_finite<const N: usize>(key: &[[f32; N]]) -> bool {
     key.iter().flatten().all(|x| x.is_finite())

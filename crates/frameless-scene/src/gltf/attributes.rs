@@ -48,6 +48,7 @@ impl Attributes {
         let mut influences = BTreeMap::new();
         for (semantic, json) in &list {
             let accessor = json.index(accessors.len(), "accessors")?;
+            check_kind(semantic, &accessors[accessor], json)?;
             match *semantic {
                 "POSITION" => attributes.position = Some(accessor),
                 "NORMAL" => attributes.normal = Some(accessor),
@@ -94,6 +95,13 @@ impl TargetAttributes {
         for (semantic, json) in members {
             let accessor = json.index(accessors.len(), "accessors")?;
             match *semantic {
+                // Tangents are not displaced, and have three components here.
+                "POSITION" | "NORMAL" | "COLOR_0" => {
+                    check_kind(semantic, &accessors[accessor], json)?;
+                }
+                _ => {}
+            }
+            match *semantic {
                 "POSITION" => target.position = Some(accessor),
                 "NORMAL" => target.normal = Some(accessor),
                 "COLOR_0" => target.color = Some(accessor),
@@ -102,6 +110,23 @@ impl TargetAttributes {
             }
         }
         Ok(target)
+    }
+}
+
+/// Refuses elements that an attribute which is read cannot have (glTF 2.0 §3.7.2.1).
+fn check_kind(semantic: &str, accessor: &Accessor<'_>, json: &Json<'_>) -> Result<(), Fault> {
+    match semantic {
+        "POSITION" | "NORMAL" => accessor.check_kind(&["VEC3"], json),
+        "TANGENT" => accessor.check_kind(&["VEC4"], json),
+        "TEXCOORD_0" | "TEXCOORD_1" | "TEXCOORD_2" | "TEXCOORD_3" => {
+            accessor.check_kind(&["VEC2"], json)
+        }
+        "COLOR_0" => accessor.check_kind(&["VEC3", "VEC4"], json),
+        _ => match influence(semantic) {
+            Some((_, 0)) => accessor.check_joints(json),
+            Some(_) => accessor.check_kind(&["VEC4"], json),
+            None => Ok(()),
+        },
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use crate::{Camera, Projection};
+use crate::{Camera, FARTHEST_M, Projection};
 
 use super::error::Fault;
 use super::json::Json;
@@ -39,10 +39,10 @@ fn parse_projection(json: &Json<'_>) -> Result<Projection, Fault> {
             let ymag = json.required("orthographic")?.required("ymag")?;
             // Negative ones mirror the picture; the specification advises against them.
             let magnitude = ymag.number()?.abs();
-            if magnitude > 0.0 {
+            if magnitude > 0.0 && magnitude <= FARTHEST_M {
                 return Ok(Projection::Orthographic { ymag: magnitude });
             }
-            Err(ymag.fault("a height above 0"))
+            Err(ymag.fault(format!("a height above 0 and up to {FARTHEST_M:e} m")))
         }
         _ => Err(kind.fault("perspective or orthographic")),
     }

@@ -6,7 +6,7 @@
 use std::borrow::Cow;
 
 use super::buffers::slice;
-use super::error::Fault;
+use super::error::{Fault, one_line};
 use super::json::Json;
 use super::limits::Budget;
 
@@ -125,7 +125,7 @@ impl<'a> Compressed<'a> {
                 .map(|indices| indices.into_iter().flat_map(u32::to_le_bytes).collect()),
         };
         let mut bytes = decoded.map_err(|error| {
-            Fault::at(json.pointer(), "data that meshoptimizer can decode", error)
+            Fault::at(json.pointer(), "data that meshoptimizer can decode", said(&error))
         })?;
         self.unfilter(&mut bytes);
         Ok(bytes)
@@ -168,6 +168,17 @@ impl<'a> Compressed<'a> {
             }
         }
     }
+}
+
+/// What its decoder's numbers mean.
+fn said(error: &meshopt::Error) -> String {
+    let text = match error {
+        meshopt::Error::Native(-1) => "bytes that begin otherwise, or a newer version",
+        meshopt::Error::Native(-2) => "data that ends too early, or is damaged",
+        meshopt::Error::Native(-3) => "more data than there are elements, or damaged data",
+        _ => return one_line(error),
+    };
+    text.to_owned()
 }
 
 /// Runs a filter over all elements of `N` bytes, which it sees as numbers.

@@ -36,13 +36,24 @@ impl<'a> Container<'a> {
             return Ok(Container { json, json_offset: BYTE_ORDER_MARK.len(), bin: None });
         }
         match bytes.trim_ascii_start().first() {
+            Some(b'{') if bytes.get(1) == Some(&0) => {
+                Err(Fault::at_byte(0, "JSON in UTF-8", "text in UTF-16"))
+            }
             None | Some(b'{') => Ok(Container { json: bytes, json_offset: 0, bin: None }),
-            Some(_) => Err(Fault::at_byte(
-                0,
-                "glTF: a binary file that begins with `glTF`, or JSON",
-                "other bytes",
-            )),
+            Some(_) => {
+                let wanted = "glTF: a binary file that begins with `glTF`, or JSON in UTF-8";
+                Err(Fault::at_byte(0, wanted, said(bytes)))
+            }
         }
+    }
+}
+
+/// What bytes seem to be that are neither.
+fn said(bytes: &[u8]) -> &'static str {
+    match bytes {
+        [0xff, 0xfe, 0, 0, ..] | [0, 0, 0xfe, 0xff, ..] => "text in UTF-32",
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] | [0, b'{', ..] => "text in UTF-16",
+        _ => "other bytes",
     }
 }
 

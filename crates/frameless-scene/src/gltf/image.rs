@@ -3,17 +3,18 @@
 //! A picture that cannot be decoded does not stop the scene: a magenta and grey checker stands in for it, which nobody takes
 //! for the real one, and a warning names it.
 
-use std::io::Cursor;
+use std::path::Path;
 
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+use image::ImageDecoder;
 
 use crate::Image;
 
 use super::buffers::View;
+use super::decode::{Decoded, decode, format_of, lenient, working_bytes};
 use super::document::Document;
 use super::error::{Fault, one_line};
 use super::json::Json;
-use super::limits::{Budget, PictureBytes};
+use super::limits::{Budget, PictureSize};
 use super::png_chunks::picture;
 use super::uri::Uri;
 
@@ -33,6 +34,14 @@ pub(super) struct FileImage<'a> {
     source: Source<'a>,
 }
 
+/// What a picture is of: pictures with equal ones are the same.
+#[derive(Debug, PartialEq, Eq, Hash)]
+pub(super) enum Bytes<'a> {
+    /// Address and length.
+    There(usize, usize),
+    File(&'a Path),
+}
+
 impl<'a> FileImage<'a> {
     pub(super) fn parse(json: &Json<'a>, view_count: usize) -> Result<FileImage<'a>, Fault> {
         let source = match (json.field("uri")?, json.field("bufferView")?) {
@@ -43,35 +52,57 @@ impl<'a> FileImage<'a> {
         Ok(FileImage { json: json.clone(), source })
     }
 
+    /// What it is of, if that is anything.
+    pub(super) fn bytes(&self, views: &[View<'_>]) -> Option<Bytes<'_>> {
+        let there = |bytes: &[u8]| Some(Bytes::There(bytes.as_ptr().addr(), bytes.len()));
+        match &self.source {
+            Source::Missing => None,
+            Source::View(view) => there(views[*view].bytes),
+            Source::Uri(Uri::Relative(path)) => Some(Bytes::File(path)),
+            Source::Uri(Uri::Data(text) | Uri::Plain(text)) => there(text.as_bytes()),
+        }
+    }
+
     /// Holds the picture's header against the limits.
     pub(super) fn open(&self, document: &mut Document<'_>) -> Result<Encoded, Fault> {
         let pointer = self.json.pointer();
-        let bytes = match &self.source {
+        let found = match &self.source {
             Source::Missing => return Err(Fault::at(pointer, "a uri or a bufferView", "neither")),
-            Source::View(view) => Bytes::View(*view),
+            Source::View(view) => Found::View(*view),
             Source::Uri(uri) => {
-                Bytes::Read(uri.read(pointer, document.folder, &mut document.budget)?)
+                Found::Read(uri.read(pointer, document.folder, &mut document.budget)?)
             }
         };
         let limits = decoder_limits(&document.budget);
-        let encoded = Encoded { bytes, pointer: pointer.to_owned(), limits };
-        let picture = picture(encoded.bytes.get(&document.views));
-        let decoder = encoded.decoder(&picture)?;
+        let encoded = Encoded { found, pointer: pointer.to_owned(), limits };
+        let bytes = encoded.found.get(&document.views);
+        document.budget.look_through(pointer, bytes.len())?;
+        let picture = picture(bytes);
+        if format_of(&picture).is_none() {
+            return Err(Fault::at(pointer, "a PNG, JPEG or WebP image", "other bytes"));
+        }
+        let decoder = lenient(&picture, &encoded.limits);
+        let decoder = decoder.map_err(|error| Fault::at(pointer, "an image", error))?;
         let ((width, height), decoded_bytes) = (decoder.dimensions(), decoder.total_bytes());
         drop(decoder);
-        // Bytes that several pictures are of speak for one of them.
-        let bytes = match &self.source {
-            Source::View(view) => Some(PictureBytes::View(*view)),
-            Source::Uri(Uri::Relative(path)) => Some(PictureBytes::File(path.clone())),
-            _ => None,
+        let size = PictureSize {
+            pixels: [width, height],
+            decoded_bytes,
+            working_bytes: working_bytes(&picture, [width, height], decoded_bytes),
+            encoded_bytes: picture.len(),
         };
-        let has_been_told = bytes.is_some_and(|bytes| !document.budget.pictures.insert(bytes));
-        let told = if has_been_told { 0 } else { picture.len() };
-        document.budget.add_image(pointer, [width, height], decoded_bytes, told)?;
+        document.budget.add_image(pointer, &size)?;
         if width == 0 || height == 0 {
             return Err(Fault::at(pointer, "an image", "no pixels"));
         }
         Ok(encoded)
+    }
+
+    /// Says what is wrong with the file of a picture that is drawn all the same.
+    pub(super) fn warn_of_damage(&self, damage: &str, document: &mut Document<'_>) {
+        let what = "images whose files are damaged are drawn as far as they can be read";
+        let called = self.json.called("image");
+        document.warnings.about(what, format!("{called} ({damage})"));
     }
 
     /// The checker, with a warning that says why.
@@ -86,53 +117,33 @@ impl<'a> FileImage<'a> {
 /// A picture that may be decoded, in any thread.
 #[derive(Debug)]
 pub(super) struct Encoded {
-    bytes: Bytes,
+    found: Found,
     pointer: String,
     limits: image::Limits,
 }
 
 #[derive(Debug)]
-enum Bytes {
-    /// Of the buffer view with this index.
+enum Found {
+    /// In the buffer view with this index.
     View(usize),
-    /// Of a file of its own.
+    /// In a file of its own.
     Read(Vec<u8>),
 }
 
-impl Bytes {
+impl Found {
     fn get<'b>(&'b self, views: &[View<'b>]) -> &'b [u8] {
         match self {
-            Bytes::View(view) => views[*view].bytes,
-            Bytes::Read(bytes) => bytes,
+            Found::View(view) => views[*view].bytes,
+            Found::Read(bytes) => bytes,
         }
     }
 }
 
 impl Encoded {
-    fn fault(&self, error: &dyn std::fmt::Display) -> Fault {
-        Fault::at(&self.pointer, "an image", error)
-    }
-
-    fn decoder<'b>(&self, bytes: &'b [u8]) -> Result<impl ImageDecoder + 'b, Fault> {
-        let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
-        let mut reader = reader.map_err(|error| self.fault(&error))?;
-        let known = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::WebP];
-        if !reader.format().is_some_and(|format| known.contains(&format)) {
-            return Err(Fault::at(&self.pointer, "a PNG, JPEG or WebP image", "other bytes"));
-        }
-        reader.limits(self.limits.clone());
-        reader.into_decoder().map_err(|error| self.fault(&error))
-    }
-
-    pub(super) fn decode(&self, views: &[View<'_>]) -> Result<Image, Fault> {
-        let picture = picture(self.bytes.get(views));
-        let decoder = self.decoder(&picture)?;
-        let (width, height) = decoder.dimensions();
-        let decoded = DynamicImage::from_decoder(decoder).map_err(|error| self.fault(&error))?;
-        // In place: a copy would be the largest thing in memory.
-        let rgba = bytemuck::try_cast_vec(decoded.into_rgba8().into_raw());
-        let rgba = rgba.map_err(|(error, _)| self.fault(&error))?;
-        Ok(Image { width, height, rgba })
+    pub(super) fn decode(&self, views: &[View<'_>]) -> Result<Decoded, Fault> {
+        let picture = picture(self.found.get(views));
+        let decoded = decode(&picture, &self.limits);
+        decoded.map_err(|error| Fault::at(&self.pointer, "an image", error))
     }
 }
 

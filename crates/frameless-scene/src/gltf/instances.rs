@@ -10,6 +10,7 @@ use super::document::Document;
 use super::error::Fault;
 use super::json::Json;
 use super::limits::within;
+use super::mesh::BYTES_PER_INFLUENCES;
 use super::node::{Hierarchy, unit};
 
 /// Per node of the file: where in [`Scene::morph_weights`] the weights of its mesh stand.
@@ -173,7 +174,7 @@ impl Placer<'_> {
     ) -> Result<Range<u32>, Fault> {
         let targets = mesh.targets.len();
         let first = scene.morph_weights.len();
-        document.budget.allocate(node.pointer(), targets, size_of::<f32>())?;
+        document.budget.allocate(node.pointer(), targets, BYTES_PER_WEIGHT)?;
         let own = node.field("weights")?;
         let shared = self.mesh_list[mesh_index].field("weights")?;
         for list in [&shared, &own].into_iter().flatten() {
@@ -193,6 +194,9 @@ impl Placer<'_> {
     }
 }
 
+/// Itself, now and at rest, and what it takes to read it from the file.
+const BYTES_PER_WEIGHT: usize = 32;
+
 /// What an instance takes for its joints and its own shape, if that deforms, and what of morph targets has to be read for each of its poses.
 fn pose_bytes(mesh: &Mesh, skin: Option<&Skin>) -> usize {
     // Now and before.
@@ -204,7 +208,9 @@ fn pose_bytes(mesh: &Mesh, skin: Option<&Skin>) -> usize {
     let deforms = skin.is_some() || !mesh.targets.is_empty();
     let shape = match deforms {
         true => {
-            BYTES_PER_POSED_VERTEX * mesh.positions.len()
+            // Of most meshes there is one set, which is not worth counting.
+            let more_sets = skin.map_or(0, |_| mesh.influences.len().saturating_sub(1));
+            (BYTES_PER_POSED_VERTEX + more_sets * BYTES_PER_INFLUENCES) * mesh.positions.len()
                 + BYTES_PER_POSED_TRIANGLE * mesh.triangles.len()
         }
         false => 0,
@@ -232,14 +238,15 @@ fn read_places(
             let wanted = "as many elements as the other attributes have";
             return Err(Fault::at(json.pointer(), wanted, count));
         }
-        within(count as u64, document.budget.limits.instances, "instances", json.pointer())?;
         if places.is_none() {
+            document.budget.place_instances(json.pointer(), count)?;
             document.budget.allocate(json.pointer(), count, size_of::<Transform>())?;
         }
         let places = places.get_or_insert_with(|| vec![Transform::IDENTITY; count]);
         let accessor = &document.accessors[accessor];
         match name {
             "TRANSLATION" | "SCALE" => {
+                accessor.check_kind(&["VEC3"], &json)?;
                 let numbers = accessor.numbers::<3>(&mut document.budget)?;
                 for (place, numbers) in places.iter_mut().zip(numbers) {
                     let field =
@@ -248,6 +255,7 @@ fn read_places(
                 }
             }
             "ROTATION" => {
+                accessor.check_kind(&["VEC4"], &json)?;
                 let numbers = accessor.numbers::<4>(&mut document.budget)?;
                 for (place, numbers) in places.iter_mut().zip(numbers) {
                     place.rotation = unit(Quat::from_array(numbers)).unwrap_or(Quat::IDENTITY);

@@ -1,10 +1,14 @@
 //! A JSON value that knows where it stands, so that every complaint names its JSON pointer.
 
 use std::borrow::Cow;
+use std::cell::RefCell;
+
+use serde::de::DeserializeSeed;
 
 use super::error::{Fault, Place, Problem, quoted};
 use super::limits::{Budget, within};
-use super::value::Value;
+use super::value::{Reader, Value};
+use super::warnings::Warnings;
 
 /// A value in the document.
 #[derive(Clone, Debug)]
@@ -212,12 +216,20 @@ pub(super) fn parse<'a>(
     text: &'a [u8],
     offset: usize,
     budget: &mut Budget,
+    warnings: &mut Warnings,
 ) -> Result<Value<'a>, Fault> {
     check_size(text, budget)?;
-    serde_json::from_slice(text).map_err(|error| Fault {
+    let mut json = serde_json::Deserializer::from_slice(text);
+    let repeated = RefCell::default();
+    let value = Reader { repeated: &repeated }.deserialize(&mut json);
+    let value = value.and_then(|value| json.end().map(|()| value)).map_err(|error| Fault {
         place: Place::Byte((offset + byte_of(text, error.line(), error.column())) as u64),
         problem: Problem::Json(error.to_string()),
-    })
+    })?;
+    for key in repeated.into_inner() {
+        warnings.about("keys that an object has several times: the last counts", quoted(&key));
+    }
+    Ok(value)
 }
 
 /// Counts brackets and separators outside strings, since a parsed value needs up to thirty times the memory of its text.
@@ -270,7 +282,7 @@ mod tests {
     use crate::Limits;
 
     fn parse_within<'a>(text: &'a [u8], limits: &Limits) -> Result<Value<'a>, Fault> {
-        parse(text, 0, &mut Budget::new(limits))
+        parse(text, 0, &mut Budget::new(limits), &mut Warnings::default())
     }
 
     fn problem(text: &str, read: impl Fn(Json<'_>) -> Result<(), Fault>) -> String {
@@ -307,18 +319,23 @@ mod tests {
     #[test]
     fn whole_numbers_may_be_written_as_floats() {
         for (text, expected) in [("3", Some(3)), ("3.0", Some(3)), ("3e2", Some(300))] {
-            let value: Value<'_> = serde_json::from_str(text).unwrap();
+            let value = parse_within(text.as_bytes(), &Limits::default()).unwrap();
             assert_eq!(Json::root(&value).unsigned().ok(), expected, "{text}");
         }
         for text in ["3.5", "-1", "1e300", "null", "\"3\""] {
-            let value: Value<'_> = serde_json::from_str(text).unwrap();
+            let value = parse_within(text.as_bytes(), &Limits::default()).unwrap();
             assert!(Json::root(&value).unsigned().is_err(), "{text}");
         }
     }
 
     #[test]
     fn syntax_errors_name_the_byte_in_the_file() {
-        let fault = parse(b"{\n  \"a\": x}", 20, &mut Budget::new(&Limits::default()));
+        let fault = parse(
+            b"{\n  \"a\": x}",
+            20,
+            &mut Budget::new(&Limits::default()),
+            &mut Warnings::default(),
+        );
         let fault = fault.unwrap_err();
         assert_eq!(fault.place, Place::Byte(20 + 9));
     }

@@ -75,15 +75,12 @@ pub(super) struct Budget {
     keyframes: u64,
     /// Files that have been counted.
     files: HashSet<PathBuf>,
-    /// Buffer views and files of which a picture has been counted.
-    pub(super) pictures: HashSet<PictureBytes>,
-}
-
-/// What several pictures may be of.
-#[derive(Debug, PartialEq, Eq, Hash)]
-pub(super) enum PictureBytes {
-    View(usize),
-    File(PathBuf),
+    /// Of pictures, as they are in the file: so many speak for their pixels.
+    picture_bytes: u64,
+    /// Of pictures, each time that they are looked through.
+    looked_through: u64,
+    /// Instances that EXT_mesh_gpu_instancing places.
+    placed: u64,
 }
 
 impl Budget {
@@ -100,7 +97,9 @@ impl Budget {
             thin_pixels: 0,
             keyframes: 0,
             files: HashSet::new(),
-            pictures: HashSet::new(),
+            picture_bytes: 0,
+            looked_through: 0,
+            placed: 0,
         }
     }
 
@@ -167,14 +166,31 @@ impl Budget {
         spend(&mut self.keyframes, count as u64, self.limits.keyframes, "keyframes", pointer)
     }
 
-    /// An image of `width · height` texels is about to be decoded from so many bytes, to so many.
-    pub(super) fn add_image(
-        &mut self,
-        pointer: &str,
-        [width, height]: [u32; 2],
-        decoded_bytes: u64,
-        encoded_bytes: usize,
-    ) -> Result<(), Fault> {
+    /// `count` instances of one node are about to be placed, by accessors that may have no data, or share it.
+    pub(super) fn place_instances(&mut self, pointer: &str, count: usize) -> Result<(), Fault> {
+        /// Of all instances, those that may come from next to nothing: by default 50,000. A file of 800 bytes could place a million.
+        const SHARE: u64 = 20;
+        /// A place is three numbers of four bytes, or of two, compressed.
+        const BYTES_PER_INSTANCE: u64 = 8;
+        within(count as u64, self.limits.instances, "instances", pointer)?;
+        let limit = self.limits.instances / SHARE + self.file_bytes / BYTES_PER_INSTANCE;
+        spend(&mut self.placed, count as u64, limit, "instances from few bytes of file", pointer)
+    }
+
+    /// The `bytes` of a picture are about to be looked through: several pictures may be of the same.
+    pub(super) fn look_through(&mut self, pointer: &str, bytes: usize) -> Result<(), Fault> {
+        /// Of all bytes: by default 64 MiB, a tenth of a second.
+        const SHARE: u64 = 64;
+        /// How often each byte of the files may be looked at besides.
+        const TIMES: u64 = 4;
+        let limit = self.limits.decoded_bytes / SHARE;
+        let limit = limit.saturating_add(TIMES.saturating_mul(self.file_bytes));
+        let what = "bytes of pictures that share them";
+        spend(&mut self.looked_through, bytes as u64, limit, what, pointer)
+    }
+
+    /// A picture is about to be decoded.
+    pub(super) fn add_image(&mut self, pointer: &str, size: &PictureSize) -> Result<(), Fault> {
         /// Drawings of a few flat colours have 10 to 50, a single colour a thousand.
         const PIXELS_PER_BYTE: u64 = 64;
         /// Of all texels, those that may come from next to nothing: by default 62 million, a second's work and 400 MB. A file of
@@ -182,19 +198,41 @@ impl Budget {
         const THIN_SHARE: u64 = 8;
         /// Processors of graphics take 16,384 or twice as many; every column and row takes memory of its own when smaller copies are made.
         const SIDE: u64 = 65_536;
+        /// Of what is in memory while a pixel is decoded, so much is not worth counting: 375 MB of them all.
+        const BYTES_PER_PIXEL: u64 = 6;
+        let &PictureSize { pixels: [width, height], decoded_bytes, working_bytes, encoded_bytes } =
+            size;
         within(u64::from(width.max(height)), SIDE, "pixels along a side of an image", pointer)?;
         let pixels = u64::from(width) * u64::from(height);
         within(pixels, self.limits.image_pixels, "pixels in one image", pointer)?;
+        // Bytes that several pictures are of speak once.
+        let told = (encoded_bytes as u64).min(self.file_bytes.saturating_sub(self.picture_bytes));
+        self.picture_bytes += told;
         // Those of 16 bits per channel take as much as two.
         let thin = pixels
             .max(decoded_bytes / 4)
-            .saturating_sub(PIXELS_PER_BYTE.saturating_mul(encoded_bytes as u64));
+            .max(working_bytes / BYTES_PER_PIXEL)
+            .saturating_sub(PIXELS_PER_BYTE.saturating_mul(told));
         let thin_limit = self.limits.total_pixels / THIN_SHARE;
         spend(&mut self.thin_pixels, thin, thin_limit, "pixels in images of few bytes", pointer)?;
         spend(&mut self.pixels, pixels, self.limits.total_pixels, "pixels in all images", pointer)?;
         let limit = self.limits.decoded_bytes.saturating_sub(self.bytes);
-        spend(&mut self.image_bytes, image_bytes(pixels), limit, "decoded bytes", pointer)
+        let bytes = image_bytes(pixels).max(working_bytes);
+        spend(&mut self.image_bytes, bytes, limit, "decoded bytes", pointer)
     }
+}
+
+/// How large a picture is.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PictureSize {
+    /// Along x and y.
+    pub(super) pixels: [u32; 2],
+    /// As the decoder says.
+    pub(super) decoded_bytes: u64,
+    /// What is in memory while it is decoded.
+    pub(super) working_bytes: u64,
+    /// In the file.
+    pub(super) encoded_bytes: usize,
 }
 
 /// Four per texel, and a third more for the smaller copies that distance needs; twice that, if a picture is used as colours and as
@@ -232,6 +270,7 @@ pub(super) fn flag_of(what: &str) -> Option<&'static str> {
         | "bytes made of few bytes of file"
         | "bytes of zeros without data"
         | "bytes of file"
+        | "bytes of pictures that share them"
         | "keyframes"
         | "JSON values" => "--max-memory",
         "triangles" | "vertices" => "--max-triangles",
@@ -240,7 +279,7 @@ pub(super) fn flag_of(what: &str) -> Option<&'static str> {
         }
         "nodes" => "--max-nodes",
         "levels of nodes" => "--max-nesting",
-        "instances" => "--max-instances",
+        "instances" | "instances from few bytes of file" => "--max-instances",
         "lights" => "--max-lights",
         _ => return None,
     })
@@ -301,35 +340,88 @@ mod tests {
         assert!(Budget::new(&limits).allocate("/a", 1 << 29, 1).is_ok());
     }
 
+    /// For files of so many bytes.
+    fn budget_of(limits: &Limits, file_bytes: usize) -> Budget {
+        let mut budget = Budget::new(limits);
+        budget.add_file(Path::new(""), file_bytes);
+        budget
+    }
+
     #[test]
     fn one_image_and_all_images_are_limited() {
         let limits = Limits { image_pixels: 10, total_pixels: 15, ..Limits::default() };
-        let mut budget = Budget::new(&limits);
-        assert!(budget.add_image("/images/0", [11, 1], 0, 99).is_err());
-        assert!(budget.add_image("/images/0", [5, 2], 0, 99).is_ok());
-        assert!(budget.add_image("/images/1", [3, 2], 0, 99).is_err());
-        assert!(budget.add_image("/images/1", [u32::MAX, u32::MAX], 0, 99).is_err());
+        let mut budget = budget_of(&limits, 400);
+        let mut add = |pixels| {
+            let size = PictureSize { pixels, encoded_bytes: 99, ..PictureSize::default() };
+            budget.add_image("/images/0", &size)
+        };
+        assert!(add([11, 1]).is_err());
+        assert!(add([5, 2]).is_ok());
+        assert!(add([3, 2]).is_err());
+        assert!(add([u32::MAX, u32::MAX]).is_err());
     }
 
     #[test]
     fn images_of_few_bytes_are_limited_together() {
-        let mut budget = Budget::new(&Limits::default());
-        let mut add = |bytes| budget.add_image("/images/0", [4096, 4096], 4 << 24, bytes);
+        let mut budget = budget_of(&Limits::default(), 2 << 20);
+        let mut add = |encoded_bytes| {
+            let (pixels, decoded_bytes) = ([4096, 4096], 4 << 24);
+            let size =
+                PictureSize { pixels, decoded_bytes, encoded_bytes, ..PictureSize::default() };
+            budget.add_image("/images/0", &size)
+        };
         for _ in 0..4 {
             assert!(add(20_000).is_ok());
         }
         assert!(add(20_000).is_err());
         // Whoever has data for it may have more.
         assert!(add(1 << 20).is_ok());
+        // But not the same data again.
+        assert!(add(1 << 20).is_ok());
+        assert!(add(1 << 20).is_err());
+    }
+
+    #[test]
+    fn what_a_decoder_needs_meanwhile_counts() {
+        let mut budget = budget_of(&Limits::default(), 100);
+        let mut add = |bytes_per_pixel: u64| {
+            let size = PictureSize {
+                pixels: [6000, 6000],
+                working_bytes: bytes_per_pixel * 6000 * 6000,
+                ..PictureSize::default()
+            };
+            budget.add_image("/images/0", &size)
+        };
+        assert!(add(11).is_err());
+        assert!(add(10).is_ok());
+    }
+
+    #[test]
+    fn instances_and_pictures_from_few_bytes_are_limited_together() {
+        let mut budget = budget_of(&Limits::default(), 80);
+        let refusal = |fault: Fault| fault.in_file("f").to_string();
+        assert!(budget.place_instances("/nodes/0", 50_000).is_ok());
+        let refused = refusal(budget.place_instances("/nodes/1", 11).unwrap_err());
+        assert!(refused.contains("/nodes/1: 50011 instances from few bytes"), "{refused}");
+        assert!(refused.contains("--max-instances"), "{refused}");
+        assert!(budget.place_instances("/nodes/1", 10).is_ok());
+        assert!(budget.look_through("/images/0", (64 << 20) + 320).is_ok());
+        let refused = refusal(budget.look_through("/images/1", 1).unwrap_err());
+        assert!(refused.contains("--max-memory"), "{refused}");
     }
 
     #[test]
     fn images_of_16_bits_per_channel_count_twice_among_those_of_few_bytes() {
-        let mut budget = Budget::new(&Limits::default());
+        let mut budget = budget_of(&Limits::default(), 500);
         // Six are within the limit for 8 bits.
         let mut add = |bytes_per_pixel: u64| {
-            let decoded_bytes = bytes_per_pixel * 3000 * 3000;
-            budget.add_image("/images/0", [3000, 3000], decoded_bytes, 100)
+            let size = PictureSize {
+                pixels: [3000, 3000],
+                decoded_bytes: bytes_per_pixel * 3000 * 3000,
+                encoded_bytes: 100,
+                ..PictureSize::default()
+            };
+            budget.add_image("/images/0", &size)
         };
         for _ in 0..3 {
             assert!(add(8).is_ok());

@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::{Camera, Contents, Geometry, Material, Node, Scene, Skin, State, Target, Value};
 
 use super::accessor::{Accessor, parse_accessors};
-use super::animation::{Nodes, load_animation};
+use super::animation::{Movers, Nodes, load_animation};
 use super::buffers::{load_buffers, parse_views};
 use super::camera::load_cameras;
 use super::choice::Choice;
@@ -90,7 +90,7 @@ fn from_bytes(
     let mut budget = Budget::new(limits);
     budget.add_file(Path::new(""), bytes.len());
     let container = Container::split(bytes, &mut warnings)?;
-    let value = parse(container.json, container.json_offset, &mut budget)?;
+    let value = parse(container.json, container.json_offset, &mut budget, &mut warnings)?;
     let root = Json::root(&value);
     charge_for_lists(&root, &mut budget)?;
     check_version(&root)?;
@@ -153,7 +153,7 @@ fn build(document: &mut Document<'_>, choice: &Choice) -> Result<Scene, Fault> {
     let limits = document.budget.limits.clone();
     let root = document.root.clone();
     let mut hierarchy = load_nodes(&root, choice.scene.as_ref(), &limits, &mut document.warnings)?;
-    let mut textures = Textures::parse(&root, document.views.len())?;
+    let mut textures = Textures::parse(&root, &document.views)?;
     let mut scene =
         Scene { materials: load_materials(document, &mut textures)?, ..Scene::default() };
     scene.images = textures.decode(document);
@@ -167,11 +167,13 @@ fn build(document: &mut Document<'_>, choice: &Choice) -> Result<Scene, Fault> {
     scene.lights = load_lights(&root, &hierarchy, &limits)?;
     scene.contents = load_contents(&root, &hierarchy)?;
     let nodes = Nodes { hierarchy: &hierarchy, weights_of: &weights_of };
-    scene.animation = load_animation(document, &nodes, &choice.animation, &mut scene.contents)?;
+    let (animation, movers) =
+        load_animation(document, &nodes, &choice.animation, &mut scene.contents)?;
+    scene.animation = animation;
     scene.nodes.clone_from(&hierarchy.nodes);
     set_still_pose(&mut scene);
     let state = scene.state_at(0.0);
-    refuse_infinite_places(&state, &hierarchy)?;
+    refuse_infinite_places(&state, &hierarchy, &movers, &root)?;
     leave_out_twins(&mut scene, &state, &mut document.warnings);
     warn_of_lost_vertices(&scene, &state, &hierarchy, &mut document.warnings);
     Ok(scene)
@@ -216,12 +218,27 @@ fn set_still_pose(scene: &mut Scene) {
 }
 
 /// Finite numbers multiply to infinite ones down a chain of nodes.
-fn refuse_infinite_places(state: &State, hierarchy: &Hierarchy) -> Result<(), Fault> {
+fn refuse_infinite_places(
+    state: &State,
+    hierarchy: &Hierarchy,
+    movers: &Movers,
+    root: &Json<'_>,
+) -> Result<(), Fault> {
     match state.world_from_node.iter().position(|place| !place.is_finite()) {
         None => Ok(()),
         Some(node) => {
             let pointer = format!("/nodes/{}", hierarchy.file_index[node]);
-            let came = format!("{} infinitely large or far away", node_called(hierarchy, node));
+            let parent = |&node: &u32| hierarchy.nodes[node as usize].parent;
+            let mut line = std::iter::successors(Some(node as u32), parent);
+            let by = match line.find_map(|node| movers.get(&node)) {
+                Some(&mover) => {
+                    let animation = root.list("animations")?[mover].called("animation");
+                    format!(" at time 0, as {animation} moves it")
+                }
+                None => String::new(),
+            };
+            let called = node_called(hierarchy, node);
+            let came = format!("{called} infinitely large or far away{by}");
             Err(Fault::at(&pointer, "a node with a finite place in the world", came))
         }
     }

@@ -133,7 +133,11 @@ impl<'a> Primitive<'a> {
         let attributes = Attributes::parse(json, &document.accessors, &mut document.warnings)?;
         let accessors = document.accessors.len();
         let indices = match json.field("indices")? {
-            Some(indices) => Some((indices.index(accessors, "accessors")?, indices)),
+            Some(indices) => {
+                let accessor = indices.index(accessors, "accessors")?;
+                document.accessors[accessor].check_indices(&indices)?;
+                Some((accessor, indices))
+            }
             None => None,
         };
         let material = match json.field("material")? {
@@ -358,7 +362,7 @@ fn made_up(mesh: &Mesh, added: &Vertices) -> usize {
 }
 
 /// Four joints and their weights.
-const BYTES_PER_INFLUENCES: usize = 8 + 16;
+pub(super) const BYTES_PER_INFLUENCES: usize = 8 + 16;
 
 /// Of each vertex that is made from one of `vertices`.
 fn bytes_per_flat_vertex(vertices: &Vertices) -> usize {
@@ -417,7 +421,7 @@ fn read_triangles(
         Some((accessor, json)) => {
             let accessor = &document.accessors[*accessor];
             // Before there is room for them, if it can be: a file may have millions.
-            refuse_beyond(vertices, accessor.highest_stored_index()?, json)?;
+            refuse_beyond(vertices, accessor.highest_stored_index(), json)?;
             let indices = accessor.indices(&mut document.budget)?;
             refuse_beyond(vertices, indices.iter().copied().max(), json)?;
             Order::Indices(indices)

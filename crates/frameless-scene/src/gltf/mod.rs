@@ -25,6 +25,7 @@ mod choice;
 mod coincident;
 mod compressed;
 mod container;
+mod decode;
 mod defaults;
 mod document;
 mod error;

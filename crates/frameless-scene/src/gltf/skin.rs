@@ -51,6 +51,7 @@ fn load_inverse_bind(
         return Ok(vec![Affine3A::IDENTITY; joints]);
     };
     let accessor = &document.accessors[reference.index(document.accessors.len(), "accessors")?];
+    accessor.check_kind(&["MAT4"], &reference)?;
     if accessor.count < joints {
         let wanted = format!("a matrix for each of the {joints} joints");
         return Err(Fault::at(reference.pointer(), wanted, accessor.count));

@@ -7,6 +7,8 @@ use rayon::prelude::*;
 
 use crate::{Filter, Image, Minify, Texture, TextureRef, UV_SETS, Wrap};
 
+use super::buffers::View;
+use super::decode::Decoded;
 use super::document::Document;
 use super::error::Fault;
 use super::image::{Encoded, FileImage};
@@ -15,6 +17,8 @@ use super::json::Json;
 /// The file's textures, and those that the scene has got so far.
 pub(super) struct Textures<'a> {
     file_images: Vec<FileImage<'a>>,
+    /// Per image of the file: the first that is of the same bytes, which is perhaps itself.
+    same_as: Vec<usize>,
     file_textures: Vec<FileTexture>,
     texture_of: HashMap<usize, u32>,
     image_of: HashMap<usize, u32>,
@@ -39,10 +43,11 @@ struct Sampler {
 }
 
 impl<'a> Textures<'a> {
-    pub(super) fn parse(root: &Json<'a>, view_count: usize) -> Result<Textures<'a>, Fault> {
+    pub(super) fn parse(root: &Json<'a>, views: &[View<'_>]) -> Result<Textures<'a>, Fault> {
         let images = root.list("images")?;
-        let file_images = images.iter().map(|json| FileImage::parse(json, view_count));
+        let file_images = images.iter().map(|json| FileImage::parse(json, views.len()));
         let file_images = file_images.collect::<Result<Vec<_>, Fault>>()?;
+        let same_as = same_as(&file_images, views);
         let samplers = root.list("samplers")?;
         let samplers = samplers.iter().map(parse_sampler).collect::<Result<Vec<_>, Fault>>()?;
         let textures = root.list("textures")?;
@@ -51,6 +56,7 @@ impl<'a> Textures<'a> {
         Ok(Textures {
             file_textures: file_textures.collect::<Result<_, Fault>>()?,
             file_images,
+            same_as,
             texture_of: HashMap::new(),
             image_of: HashMap::new(),
             shown: Vec::new(),
@@ -116,6 +122,7 @@ impl<'a> Textures<'a> {
     }
 
     fn image(&mut self, file_image: usize, document: &mut Document<'_>) -> u32 {
+        let file_image = self.same_as[file_image];
         if let Some(&known) = self.image_of.get(&file_image) {
             return known;
         }
@@ -131,13 +138,29 @@ impl<'a> Textures<'a> {
         let decoded = shown
             .into_par_iter()
             .map(|(number, encoded)| (number, encoded.and_then(|encoded| encoded.decode(views))));
-        let decoded: Vec<(usize, Result<Image, Fault>)> = decoded.collect();
-        let images = decoded.into_iter().map(|(number, image)| {
+        let decoded: Vec<(usize, Result<Decoded, Fault>)> = decoded.collect();
+        let images = decoded.into_iter().map(|(number, decoded)| {
             let file_image = &self.file_images[number];
-            image.unwrap_or_else(|fault| file_image.stand_in(&fault, document))
+            let Decoded { image, damage } = match decoded {
+                Ok(decoded) => decoded,
+                Err(fault) => return file_image.stand_in(&fault, document),
+            };
+            damage.iter().for_each(|damage| file_image.warn_of_damage(damage, document));
+            image
         });
         images.collect()
     }
+}
+
+/// Per image: the first that is of the same bytes, which is perhaps itself.
+fn same_as(images: &[FileImage<'_>], views: &[View<'_>]) -> Vec<usize> {
+    let mut known = HashMap::new();
+    let mut same_as = Vec::with_capacity(images.len());
+    for (index, image) in images.iter().enumerate() {
+        let first = image.bytes(views).map(|bytes| *known.entry(bytes).or_insert(index));
+        same_as.push(first.unwrap_or(index));
+    }
+    same_as
 }
 
 impl FileTexture {

@@ -30,7 +30,9 @@ pub(super) enum Uri<'a> {
 impl<'a> Uri<'a> {
     pub(super) fn parse(json: &Json<'a>) -> Result<Uri<'a>, Fault> {
         let text = json.text()?;
-        if let Some(data) = text.strip_prefix("data:") {
+        // Schemes are the same in capitals (RFC 3986 §3.1).
+        let scheme = text.get(..5).filter(|scheme| scheme.eq_ignore_ascii_case("data:"));
+        if let Some(data) = scheme.map(|scheme| &text[scheme.len()..]) {
             let payload = data.split_once(',');
             let uri = payload.and_then(|(header, payload)| match header.strip_suffix(";base64") {
                 Some(media_type) => is_media_type(media_type).then_some(Uri::Data(payload)),

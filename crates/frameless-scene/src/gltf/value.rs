@@ -2,9 +2,10 @@
 //! tenth of what serde_json's own does, and text that stands in the file as it is meant is not copied.
 
 use std::borrow::Cow;
+use std::cell::RefCell;
 use std::fmt;
 
-use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde::de::{Deserialize, DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
 
 /// A JSON value, with text of the file that lives for `'a`.
 #[derive(Debug)]
@@ -48,15 +49,32 @@ impl<'a> Value<'a> {
     }
 }
 
-impl<'de> Deserialize<'de> for Value<'de> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Value<'de>, D::Error> {
-        deserializer.deserialize_any(Values)
+/// Reads a value, and takes note of keys that stand in one object several times.
+#[derive(Clone, Copy)]
+pub(super) struct Reader<'r> {
+    pub(super) repeated: &'r RefCell<Vec<String>>,
+}
+
+impl<'de> DeserializeSeed<'de> for Reader<'_> {
+    type Value = Value<'de>;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Value<'de>, D::Error> {
+        deserializer.deserialize_any(self)
     }
 }
 
-struct Values;
+impl Reader<'_> {
+    fn note(self, key: &str) {
+        /// More are as good as these.
+        const MOST: usize = 8;
+        let mut repeated = self.repeated.borrow_mut();
+        if repeated.len() < MOST && !repeated.iter().any(|known| known == key) {
+            repeated.push(key.to_owned());
+        }
+    }
+}
 
-impl<'de> Visitor<'de> for Values {
+impl<'de> Visitor<'de> for Reader<'_> {
     type Value = Value<'de>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -93,7 +111,7 @@ impl<'de> Visitor<'de> for Values {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut array: A) -> Result<Value<'de>, A::Error> {
         let mut elements = Vec::new();
-        while let Some(element) = array.next_element()? {
+        while let Some(element) = array.next_element_seed(self)? {
             elements.push(element);
         }
         Ok(Value::Array(elements.into_boxed_slice()))
@@ -101,13 +119,19 @@ impl<'de> Visitor<'de> for Values {
 
     fn visit_map<A: MapAccess<'de>>(self, mut object: A) -> Result<Value<'de>, A::Error> {
         let mut members: Vec<(Cow<'de, str>, Value<'de>)> = Vec::new();
-        while let Some((Key(key), value)) = object.next_entry()? {
-            members.push((key, value));
+        while let Some(Key(key)) = object.next_key()? {
+            members.push((key, object.next_value_seed(self)?));
         }
         // Of members with one key the last counts: it is the first now.
         members.reverse();
         members.sort_by(|(a, _), (b, _)| a.cmp(b));
-        members.dedup_by(|(later, _), (kept, _)| later == kept);
+        members.dedup_by(|(later, _), (kept, _)| {
+            let is_repeated = later == kept;
+            if is_repeated {
+                self.note(later);
+            }
+            is_repeated
+        });
         Ok(Value::Object(members.into_boxed_slice()))
     }
 }
@@ -142,8 +166,13 @@ impl<'de> Visitor<'de> for Keys {
 mod tests {
     use super::*;
 
+    fn read_with<'a>(text: &'a str, repeated: &RefCell<Vec<String>>) -> Value<'a> {
+        let mut json = serde_json::Deserializer::from_str(text);
+        Reader { repeated }.deserialize(&mut json).expect("the test's JSON is fine")
+    }
+
     fn read(text: &str) -> Value<'_> {
-        serde_json::from_str(text).expect("the test's JSON is fine")
+        read_with(text, &RefCell::default())
     }
 
     #[test]
@@ -164,6 +193,13 @@ mod tests {
         let value = read(r#"{"a":1,"b":2,"a":3,"a":4}"#);
         assert!(matches!(value.get("a"), Some(Value::Unsigned(4))), "{value:?}");
         assert!(matches!(&value, Value::Object(members) if members.len() == 2));
+    }
+
+    #[test]
+    fn keys_that_come_again_are_told_once_each() {
+        let repeated = RefCell::default();
+        read_with(r#"[{"a":{"x":0,"y":1,"x":2},"b":2,"a":3,"a":4},{"a":0,"b":1}]"#, &repeated);
+        assert_eq!(repeated.into_inner(), ["x", "a"]);
     }
 
     #[test]

@@ -218,6 +218,102 @@ fn sparse_indices_beyond_the_array_are_refused() {
     assert!(maker.refusal().contains("/accessors/0/sparse/indices: wanted indices below 4, got 4"));
 }
 
+/// glTF 2.0 §3.6.2.3 wants them so, and which of two values counted would be chance.
+#[test]
+fn sparse_indices_that_do_not_rise_are_refused() {
+    for (indices, is_fine) in [([0, 2], true), ([2, 2], false), ([2, 1], false)] {
+        let maker = Maker::with_primitive(|maker| {
+            let position = maker.floats("VEC3", &SQUARE);
+            let indices = maker.view(&[indices[0], 0, indices[1], 0]);
+            let values = maker.view(&[0; 24]);
+            maker.json["accessors"][position]["sparse"] = json!({"count": 2,
+                "indices": {"bufferView": indices, "componentType": U16},
+                "values": {"bufferView": values}});
+            json!({"attributes": {"POSITION": position}})
+        });
+        match is_fine {
+            true => drop(maker.load()),
+            false => {
+                let refusal = maker.refusal();
+                let expected = "/accessors/0/sparse/indices: wanted indices each higher";
+                assert!(refusal.contains(expected), "{refusal}");
+            }
+        }
+    }
+}
+
+#[test]
+fn elements_of_another_kind_are_refused_where_they_are_used() {
+    let mut maker = Maker::with_primitive(|maker| {
+        let position = maker.floats("VEC3", &SQUARE);
+        let normal = maker.floats("VEC2", &[0.0; 8]);
+        json!({"attributes": {"POSITION": position, "NORMAL": normal}})
+    });
+    assert_eq!(
+        maker.refusal(),
+        "made.glb: /meshes/0/primitives/0/attributes/NORMAL: wanted 3 components per element (VEC3), got VEC2 of /accessors/1"
+    );
+    let primitive = &mut maker.json["meshes"][0]["primitives"][0];
+    *primitive = json!({"attributes": {"POSITION": 0}, "indices": 1});
+    let refusal = maker.refusal();
+    let expected = "/meshes/0/primitives/0/indices: wanted unsigned scalars (5121, 5123 or 5125) as indices, \
+        got VEC2 of 5126 in /accessors/1";
+    assert!(refusal.contains(expected), "{refusal}");
+}
+
+#[test]
+fn how_many_bytes_an_accessor_needs_is_told() {
+    let mut maker = Maker::new();
+    maker.floats("VEC3", &SQUARE);
+    maker.json["accessors"][0]["count"] = json!(5);
+    let expected = "within the view of 48 bytes, from byte 0 (so many need 60 bytes), got 5";
+    assert!(maker.refusal().contains(expected), "{}", maker.refusal());
+}
+
+#[test]
+fn keys_that_come_twice_are_told() {
+    let text = br#"{"asset": {"version": "2.0"}, "extras": {"twice": 1, "twice": 2}}"#;
+    let scene = load_bytes("twice.gltf", text, None, &Limits::default()).unwrap();
+    let told =
+        |warning: &String| warning.contains("several times") && warning.contains("\"twice\"");
+    assert!(scene.warnings.iter().any(told), "{:?}", scene.warnings);
+}
+
+#[test]
+fn text_in_other_encodings_is_called_by_its_name() {
+    let words: Vec<u16> = r#"{"asset": {"version": "2.0"}}"#.encode_utf16().collect();
+    let [little, big] = [u16::to_le_bytes, u16::to_be_bytes]
+        .map(|bytes| words.iter().flat_map(|word| bytes(*word)).collect::<Vec<u8>>());
+    let marked = [&[0xff, 0xfe], &little[..]].concat();
+    for text in [little, big, marked] {
+        let error = load_bytes("wide.gltf", &text, None, &Limits::default()).unwrap_err();
+        assert!(error.to_string().contains("got text in UTF-16"), "{error}");
+    }
+}
+
+#[test]
+fn schemes_may_be_written_in_capitals() {
+    let text = String::from_utf8(rich().gltf()).unwrap().replace("data:app", "DATA:app");
+    assert!(text.contains("DATA:app"));
+    assert!(load_bytes("rich.gltf", text.as_bytes(), None, &Limits::default()).is_ok());
+}
+
+/// Its rays would not be numbers.
+#[test]
+fn pictures_higher_than_the_world_are_refused() {
+    let mut maker = Maker::new();
+    for (ymag, is_fine) in [(3.4e38, false), (1e16, false), (1e-45, true), (2.0, true)] {
+        maker.json["cameras"] = json!([{"type": "orthographic", "orthographic": {"ymag": ymag}}]);
+        match is_fine {
+            true => drop(maker.load()),
+            false => {
+                let refusal = maker.refusal();
+                assert!(refusal.contains("/cameras/0/orthographic/ymag: wanted"), "{refusal}");
+            }
+        }
+    }
+}
+
 /// A file with `count` nodes, each the child of the one before.
 fn chain(count: usize) -> Maker {
     let mut maker = Maker::new();

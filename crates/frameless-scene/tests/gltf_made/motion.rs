@@ -101,7 +101,20 @@ fn values_that_do_not_match_the_keys_are_refused() {
     }
     let mut maker = moved("scale", "LINEAR", &[0.0], &[1.0; 3]);
     maker.json["animations"][0]["channels"][0]["target"]["path"] = json!("rotation");
-    assert!(maker.refusal().contains("/accessors/1: wanted 4 components"), "{}", maker.refusal());
+    let refusal = maker.refusal();
+    let expected = "/animations/0/channels/0/sampler: wanted 4 components per element (VEC4)";
+    assert!(refusal.contains(expected), "{refusal}");
+    assert!(refusal.contains("got VEC3 of /accessors/1"), "{refusal}");
+}
+
+#[test]
+fn the_animation_that_moves_a_node_beyond_all_numbers_is_named() {
+    let mut maker = moved("scale", "LINEAR", &[0.0, 1.0], &[3e38; 6]);
+    maker.json["nodes"] = json!([{"children": [1]}, {"scale": [1e10, 1, 1]}]);
+    let refusal = maker.refusal();
+    let expected = "/nodes/1: wanted a node with a finite place in the world, got /nodes/1 infinitely large or far \
+        away at time 0, as animation \"an animation\" (/animations/0) moves it";
+    assert!(refusal.contains(expected), "{refusal}");
 }
 
 #[test]

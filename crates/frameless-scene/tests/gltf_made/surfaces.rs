@@ -258,7 +258,93 @@ fn what_is_not_the_picture_of_a_png_counts_for_nothing() {
     assert!(!warns(&scene, "image"), "{:?}", scene.warnings);
 }
 
-/// Pictures of one buffer view are as many pictures with the bytes of one.
+/// A picture whose rows are not all alike.
+fn gradient() -> image::RgbImage {
+    image::RgbImage::from_fn(64, 64, |x, y| image::Rgb([4 * x as u8, 4 * y as u8, 99]))
+}
+
+fn encoded(format: image::ImageFormat) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    gradient().write_to(&mut bytes, format).unwrap();
+    bytes.into_inner()
+}
+
+fn crc_32(bytes: &[u8]) -> u32 {
+    let step =
+        |crc: u32| (0..8).fold(crc, |crc, _| (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg()));
+    !bytes.iter().fold(!0, |crc, byte| step(crc ^ u32::from(*byte)))
+}
+
+/// The last bytes of its data are wrong (their checksum, before that of the chunk), which is as it should be.
+fn png_with_wrong_data_checksum() -> Vec<u8> {
+    let mut bytes = encoded(image::ImageFormat::Png);
+    let at = |kind: &[u8]| bytes.windows(4).position(|four| four == kind).unwrap();
+    let (data, end) = (at(b"IDAT"), at(b"IEND") - 8);
+    bytes[end - 1] ^= 1;
+    let crc = crc_32(&bytes[data..end]);
+    bytes[end..end + 4].copy_from_slice(&crc.to_be_bytes());
+    bytes
+}
+
+#[test]
+fn damaged_pictures_are_drawn_aloud() {
+    let load =
+        |bytes: &[u8]| load_bytes("i.glb", &with_image(bytes).glb(), None, &Limits::default());
+    let damaged = "damaged are drawn as far as they can be read: image \"picture\" (/images/0) (";
+    let (png, jpeg) = (encoded(image::ImageFormat::Png), encoded(image::ImageFormat::Jpeg));
+    for whole in [&png, &jpeg] {
+        let scene = load(whole).unwrap();
+        assert!(!warns(&scene, "image"), "{:?}", scene.warnings);
+        assert_eq!(scene.images[0].width, 64);
+    }
+    let cut = &jpeg[..jpeg.len() - 99];
+    let endless = &jpeg[..jpeg.len() - 2];
+    for bytes in [cut, endless, &png_with_wrong_data_checksum()] {
+        let scene = load(bytes).unwrap();
+        assert!(warns(&scene, damaged), "{:?}", scene.warnings);
+        // What is there of it is drawn.
+        let (right, found) = (gradient().get_pixel(9, 2).0, scene.images[0].rgba[2 * 64 + 9]);
+        let close = right.iter().zip(found).all(|(a, b)| a.abs_diff(b) < 16);
+        assert!(close, "{right:?} {found:?}");
+    }
+    for bytes in [&png[..png.len() / 2], &png[..png.len() - 12]] {
+        let scene = load(bytes).unwrap();
+        assert!(warns(&scene, "replaced by a magenta checker"), "{:?}", scene.warnings);
+    }
+}
+
+/// As they were drawn before there were strict decoders: all kinds of pixels.
+#[test]
+fn pictures_of_all_kinds_of_pixels_are_what_they_were() {
+    use image::{DynamicImage, ImageFormat};
+    let rgb = DynamicImage::from(gradient());
+    let kinds = [
+        rgb.clone(),
+        rgb.to_luma8().into(),
+        rgb.to_luma_alpha8().into(),
+        rgb.to_rgba8().into(),
+        rgb.to_luma16().into(),
+        rgb.to_luma_alpha16().into(),
+        rgb.to_rgb16().into(),
+        rgb.to_rgba16().into(),
+    ];
+    for picture in kinds {
+        for format in [ImageFormat::Png, ImageFormat::Jpeg] {
+            let mut bytes = std::io::Cursor::new(Vec::new());
+            if picture.write_to(&mut bytes, format).is_err() {
+                continue;
+            }
+            let bytes = bytes.into_inner();
+            let expected = image::load_from_memory(&bytes).unwrap().into_rgba8();
+            let scene = with_image(&bytes).load();
+            assert!(!warns(&scene, "image"), "{:?}", scene.warnings);
+            let texels = scene.images[0].rgba.as_flattened();
+            assert!(texels == expected.as_raw(), "{:?} as {format:?}", picture.color());
+        }
+    }
+}
+
+/// Pictures of overlapping buffer views are as many pictures with the bytes of one; those of one view are one.
 #[test]
 fn bytes_of_many_pictures_speak_for_one_of_them() {
     let mut state = 1_u32;
@@ -267,17 +353,28 @@ fn bytes_of_many_pictures_speak_for_one_of_them() {
         (state >> 24) as u8
     };
     let rows: Vec<u8> = (0..5000 / 8 * 5000).map(|_| noise()).collect();
-    let mut maker = with_image(&png_of_bits(5000, 5000, &rows, &[]));
+    // With a few bytes behind it, of which each view has another number.
+    let mut maker = with_image(&[png_of_bits(5000, 5000, &rows, &[]), vec![0; 4]].concat());
     let image = maker.json["images"][0].clone();
+    let view = image["bufferView"].as_u64().unwrap() as usize;
+    let view = maker.json["bufferViews"][view].clone();
     maker.json["materials"][0]["emissiveFactor"] = json!([1.0, 1.0, 1.0]);
     for (index, used_as) in [(1, "normalTexture"), (2, "occlusionTexture"), (3, "emissiveTexture")]
     {
-        maker.push("images", image.clone());
+        let mut shorter = view.clone();
+        shorter["byteLength"] = json!(view["byteLength"].as_u64().unwrap() - index);
+        let mut image = image.clone();
+        image["bufferView"] = json!(maker.push("bufferViews", shorter));
+        maker.push("images", image);
         maker.push("textures", json!({"source": index}));
         maker.json["materials"][0][used_as] = json!({"index": index});
     }
     let scene = load_bytes("i.glb", &maker.glb(), None, &Limits::default()).unwrap();
     assert!(warns(&scene, "pixels in images of few bytes"), "{:?}", scene.warnings);
+    maker.json["images"] = json!(vec![image; 4]);
+    let scene = load_bytes("i.glb", &maker.glb(), None, &Limits::default()).unwrap();
+    assert!(!warns(&scene, "pixels in images of few bytes"), "{:?}", scene.warnings);
+    assert_eq!(scene.images.len(), 1);
 }
 
 /// A picture all of one colour.

@@ -1,0 +1,248 @@
+//! From the bytes of a PNG, JPEG or WebP to pixels, and whether any of them were damaged.
+//!
+//! Decoders draw what they can of a file that is cut, or whose checksums are wrong, and say nothing: so each picture is read strictly first,
+//! and what is wrong with it then is told, if it can be read at all. A byte that was changed inside a JPEG or WebP may still go unseen: they
+//! have no checksums.
+
+use std::fmt::Display;
+use std::io::Cursor;
+
+use image::DynamicImage::{ImageLumaA8, ImageLumaA16, ImageRgba8, ImageRgba16};
+use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader};
+use png::ColorType::{GrayscaleAlpha, Rgba};
+use zune_core::bytestream::ZCursor;
+use zune_core::colorspace::ColorSpace;
+use zune_core::options::DecoderOptions;
+use zune_jpeg::JpegDecoder;
+
+use crate::Image;
+
+use super::error::one_line;
+
+/// A picture, and what is wrong with the file that it is of.
+pub(super) struct Decoded {
+    pub(super) image: Image,
+    pub(super) damage: Option<String>,
+}
+
+/// What the decoders of this program read.
+pub(super) fn format_of(picture: &[u8]) -> Option<ImageFormat> {
+    let known = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::WebP];
+    image::guess_format(picture).ok().filter(|format| known.contains(format))
+}
+
+/// A decoder that reads what it can of a picture.
+pub(super) fn lenient<'b>(
+    picture: &'b [u8],
+    limits: &image::Limits,
+) -> image::ImageResult<impl ImageDecoder + use<'b>> {
+    let mut reader = ImageReader::new(Cursor::new(picture)).with_guessed_format()?;
+    reader.limits(limits.clone());
+    reader.into_decoder()
+}
+
+/// Decodes a picture as far as it goes.
+pub(super) fn decode(picture: &[u8], limits: &image::Limits) -> Result<Decoded, String> {
+    let (strict, told) = match format_of(picture) {
+        Some(ImageFormat::Png) => (strict_png(picture, limits), None),
+        Some(ImageFormat::Jpeg) => (strict_jpeg(picture), missing_end(picture)),
+        _ => (Err(String::new()), missing_bytes(picture)),
+    };
+    let (decoded, wrong) = match strict {
+        Ok(decoded) => (decoded, None),
+        Err(wrong) => {
+            let decoder = lenient(picture, limits).map_err(|error| one_line(&error))?;
+            let decoded = DynamicImage::from_decoder(decoder).map_err(|error| one_line(&error))?;
+            (decoded, Some(wrong).filter(|wrong| !wrong.is_empty()))
+        }
+    };
+    let (width, height) = (decoded.width(), decoded.height());
+    // In place: a copy would be the largest thing in memory.
+    let rgba = bytemuck::try_cast_vec(decoded.into_rgba8().into_raw());
+    let rgba = rgba.map_err(|(error, _)| one_line(&error))?;
+    Ok(Decoded { image: Image { width, height, rgba }, damage: told.or(wrong) })
+}
+
+fn said(error: impl Display) -> String {
+    one_line(&error)
+}
+
+/// With all checksums right.
+fn strict_png(picture: &[u8], limits: &image::Limits) -> Result<DynamicImage, String> {
+    let mut options = png::DecodeOptions::default();
+    options.set_ignore_adler32(false);
+    let mut decoder = png::Decoder::new_with_options(Cursor::new(picture), options);
+    let most = limits.max_alloc.and_then(|bytes| usize::try_from(bytes).ok());
+    decoder.set_limits(png::Limits { bytes: most.unwrap_or(usize::MAX) });
+    // Four channels at once: a copy would be the largest thing in memory.
+    decoder.set_transformations(png::Transformations::EXPAND | png::Transformations::ALPHA);
+    let mut reader = decoder.read_info().map_err(said)?;
+    let length = reader.output_buffer_size().ok_or("too large")?;
+    let ((width, height), (channels, depth)) = (reader.info().size(), reader.output_color_type());
+    let decoded = match depth {
+        png::BitDepth::Sixteen => {
+            let mut words = vec![0u16; length.div_ceil(2)];
+            let bytes = bytemuck::cast_slice_mut(&mut words);
+            reader.next_frame(bytes).map_err(said)?;
+            words.iter_mut().for_each(|word| *word = u16::from_be(*word));
+            match channels {
+                Rgba => ImageBuffer::from_raw(width, height, words).map(ImageRgba16),
+                GrayscaleAlpha => ImageBuffer::from_raw(width, height, words).map(ImageLumaA16),
+                _ => None,
+            }
+        }
+        _ => {
+            let mut bytes = vec![0; length];
+            reader.next_frame(&mut bytes).map_err(said)?;
+            match channels {
+                Rgba => ImageBuffer::from_raw(width, height, bytes).map(ImageRgba8),
+                GrayscaleAlpha => ImageBuffer::from_raw(width, height, bytes).map(ImageLumaA8),
+                _ => None,
+            }
+        }
+    };
+    // Says nothing, as this is no fault of the file: the other decoder reads it.
+    decoded.ok_or_else(String::new)
+}
+
+/// Without anything that is left out or made up.
+fn strict_jpeg(picture: &[u8]) -> Result<DynamicImage, String> {
+    let options = DecoderOptions::default()
+        .set_strict_mode(true)
+        .set_max_width(usize::MAX)
+        .set_max_height(usize::MAX);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(picture), options);
+    decoder.decode_headers().map_err(said)?;
+    // Those of which there is a way to four channels; all others are for the other decoder, and nothing is said.
+    let (Some(ColorSpace::YCbCr | ColorSpace::Luma), Some(info)) =
+        (decoder.input_colorspace(), decoder.info())
+    else {
+        return Err(String::new());
+    };
+    // What it decodes to is settled with the headers.
+    let options = options.jpeg_set_out_colorspace(ColorSpace::RGBA);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(picture), options);
+    let rgba = decoder.decode().map_err(said)?;
+    let decoded = ImageBuffer::from_raw(info.width.into(), info.height.into(), rgba);
+    decoded.map(ImageRgba8).ok_or_else(String::new)
+}
+
+/// JPEGs end with a marker (ITU T.81 §B.1.1.3).
+fn missing_end(picture: &[u8]) -> Option<String> {
+    const END: [u8; 2] = [0xff, 0xd9];
+    let has_end = picture.windows(2).rev().any(|two| two == END);
+    (!has_end).then(|| "its end is missing".to_owned())
+}
+
+/// WebP files say how long they are after four bytes, and count from there.
+fn missing_bytes(picture: &[u8]) -> Option<String> {
+    let length: [u8; 4] = picture.get(4..8)?.try_into().ok()?;
+    let (wanted, came) = (u64::from(u32::from_le_bytes(length)) + 8, picture.len() as u64);
+    (came < wanted).then(|| format!("{came} of its {wanted} bytes are there"))
+}
+
+/// What is in memory while a picture is decoded, by this or the lenient decoder, of the bytes that it says it decodes to.
+///
+/// Of JPEGs that come in several scans all coefficients are kept, two bytes each, of all blocks, as many as the finest channel has.
+pub(super) fn working_bytes(picture: &[u8], [width, height]: [u32; 2], decoded_bytes: u64) -> u64 {
+    const RGBA: u64 = 4;
+    let pixels = u64::from(width) * u64::from(height);
+    // As the decoder has it, then as we do.
+    let both = decoded_bytes.saturating_add(RGBA * pixels);
+    match format_of(picture) {
+        Some(ImageFormat::Jpeg) => match Frame::of(picture).filter(|frame| frame.is_kept) {
+            Some(frame) => (2 * frame.coefficients(pixels)).saturating_add(RGBA * pixels),
+            None => RGBA * pixels,
+        },
+        // Eight bits per channel are decoded to what we have.
+        Some(ImageFormat::Png) if decoded_bytes <= RGBA * pixels => RGBA * pixels,
+        _ => both,
+    }
+}
+
+/// How the samples of a JPEG are arranged (ITU T.81 §B.2.2).
+struct Frame {
+    /// Σ horizontal · vertical sampling over all channels, and the most of each.
+    samples: u64,
+    most: [u64; 2],
+    /// Whether all of them are kept until the end: a progressive one, or one whose channels come one after the other.
+    is_kept: bool,
+}
+
+impl Frame {
+    /// By the header; `None` if this is no JPEG that anything can be decoded of.
+    fn of(picture: &[u8]) -> Option<Frame> {
+        let mut rest = picture.strip_prefix(b"\xff\xd8")?;
+        let mut frame: Option<Frame> = None;
+        let mut channels = 0;
+        loop {
+            // Between segments there may be anything.
+            let begin = rest.windows(2).position(|two| two[0] == 0xff && two[1] >= 0xc0)?;
+            let (kind, after) = (rest[begin + 1], &rest[begin + 2..]);
+            let length = usize::from(u16::from_be_bytes(*after.first_chunk::<2>()?));
+            let segment = after.get(2..length)?;
+            rest = &after[length..];
+            match kind {
+                0xc0..=0xc3 => {
+                    channels = *segment.get(5)?;
+                    let sampling = segment.get(6..)?.chunks_exact(3).take(channels.into());
+                    let sampling = sampling.map(|one| [one[1] >> 4, one[1] & 15].map(u64::from));
+                    let (mut samples, mut most) = (0, [1, 1]);
+                    for [x, y] in sampling {
+                        samples += x * y;
+                        most = [most[0].max(x), most[1].max(y)];
+                    }
+                    frame = Some(Frame { samples, most, is_kept: kind == 0xc2 });
+                }
+                0xda => {
+                    let is_part = *segment.first()? < channels;
+                    return frame.map(|frame| Frame { is_kept: frame.is_kept || is_part, ..frame });
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn coefficients(&self, pixels: u64) -> u64 {
+        pixels.saturating_mul(self.samples) / (self.most[0] * self.most[1])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Start of frame (progressive or not), then of scan.
+    fn header(progressive: bool, sampling: &[u8], channels_in_scan: u8) -> Vec<u8> {
+        let channels = sampling.len() as u8;
+        let length = 8 + 3 * channels;
+        let kind = if progressive { 0xc2 } else { 0xc0 };
+        let mut bytes = b"\xff\xd8\xff\xe0\x00\x04ab".to_vec();
+        bytes.extend([0xff, kind, 0, length, 8, 0, 100, 0, 100, channels]);
+        sampling.iter().for_each(|&sampling| bytes.extend([1, sampling, 0]));
+        bytes.extend([0xff, 0xda, 0, 3, channels_in_scan]);
+        bytes
+    }
+
+    #[test]
+    fn what_is_kept_while_a_jpeg_is_decoded_is_known() {
+        let bytes = |header: Vec<u8>| working_bytes(&header, [100, 100], 30_000);
+        let plain = 40_000;
+        assert_eq!(bytes(header(false, &[0x22, 0x11, 0x11], 3)), plain);
+        assert_eq!(bytes(header(true, &[0x22, 0x11, 0x11], 3)), plain + 2 * 15_000);
+        assert_eq!(bytes(header(true, &[0x11; 4], 1)), plain + 2 * 40_000);
+        assert_eq!(bytes(header(false, &[0x11; 3], 1)), plain + 2 * 30_000);
+        let cut = header(true, &[0x11; 4], 1);
+        for length in 0..cut.len() {
+            let _ = working_bytes(&cut[..length], [u32::MAX; 2], u64::MAX);
+        }
+    }
+
+    #[test]
+    fn what_is_cut_is_seen() {
+        assert!(missing_end(b"\xff\xd8 picture \xff\xd9 and more").is_none());
+        assert!(missing_end(b"\xff\xd8 pictu").is_some());
+        assert!(missing_bytes(b"RIFF\x02\0\0\0WEB").is_none());
+        assert!(missing_bytes(b"RIFF\x04\0\0\0WEB").is_some());
+    }
+}
