@@ -1,11 +1,13 @@
 //! `frameless info`: what is in a scene.
 
 use std::collections::HashSet;
+use std::sync::Arc;
 
 use frameless_scene::{
     AfterEnd, Camera, Geometry, Image, Influences, Light, LightKind, Mesh, MorphTarget, Projection,
     Scene, Target,
 };
+use frameless_trace::World;
 
 use crate::args::InfoArgs;
 use crate::failure::Failure;
@@ -18,17 +20,24 @@ const MIB: f64 = 1_048_576.0;
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     // Warnings stand in the list below.
     logger::silence();
-    let scene = input::scene(&args.scene, &args.choice, &args.limits.limits())?;
-    Ok(output::print(&describe(&scene))?)
+    let limits = args.limits.limits();
+    let scene = Arc::new(input::scene(&args.scene, &args.choice, &limits)?);
+    // Whether it can be drawn is known when it has been made ready for that.
+    let world = World::open(&args.scene, Arc::clone(&scene), &limits);
+    let overlap = world.map_err(Failure::bad_input)?.overlap();
+    Ok(output::print(&describe(&scene, overlap))?)
 }
 
 /// A paragraph of lines `what  how many`, lists indented below, warnings last.
-fn describe(scene: &Scene) -> String {
+fn describe(scene: &Scene, overlap: u64) -> String {
     let mut lines = vec![format!("scene       {}", scene.name)];
     let contents = &scene.contents;
     let shown: Vec<usize> = contents.shown_scene.into_iter().collect();
     lines.extend(parts("scenes", &contents.scenes, "shown", &shown));
     lines.extend([shapes(scene), triangles(scene), bounds(scene)]);
+    lines.push(format!(
+        "overlap     {overlap} boxes for a ray, where most surfaces lie on each other"
+    ));
     lines.push(format!("materials   {}", scene.materials.len()));
     lines.push(format!("textures    {}", textures(scene)));
     lines.extend(scene.images.iter().enumerate().map(|(i, image)| item(i, &picture(image))));

@@ -16,12 +16,13 @@ use crate::{input, output};
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     output::check_png_path(&args.out)?;
     let settings = args.light.settings()?;
-    let (scene, _) = input::lit_scene(&args.scene, &args.open)?;
+    let (scene, opener) = input::lit_scene(&args.scene, &args.open)?;
     let view = ViewSource::Camera(input::camera(&scene, args.camera)?);
 
     let waiting = waiting();
     waiting.set_message(format!("building the BVH of {}", scene.name));
-    let world = World::new(Arc::new(scene));
+    let world = World::open(&args.scene, Arc::new(scene), &opener.limits);
+    let world = world.map_err(Failure::bad_input)?;
     waiting.set_message(format!("tracing {}×{} pixels", args.size.width, args.size.height));
     let pool = rayon::ThreadPoolBuilder::new().build().context("cannot start threads")?;
     let (secs, size, samples) = (args.time, args.size, args.samples);

@@ -65,10 +65,14 @@ fn show(look: &LookArgs) -> Result<Show<CpuTracer>, Failure> {
     }
     let (scene, opener) = view::scene(look)?;
     let scene = Arc::new(scene);
-    let prepare = |scene: &Arc<Scene>| Arc::new(World::new(Arc::clone(scene)));
+    let limits = opener.limits.clone();
+    let world = World::open(&look.scene, Arc::clone(&scene), &limits);
+    let world = Arc::new(world.map_err(Failure::bad_input)?);
+    let prepare = move |scene: &Arc<Scene>| {
+        Ok(Arc::new(World::open(&scene.name, Arc::clone(scene), &limits)?))
+    };
     let camera = ViewSource::Camera(0);
-    let tracer = CpuTracer::new(prepare(&scene), camera, look.light.settings()?, look.threads)
-        .in_real_time();
+    let tracer = CpuTracer::new(world, camera, look.light.settings()?, look.threads).in_real_time();
     let size = settings.picture.size_in(FIRST_PLACE);
     Ok(Show {
         session: Session::new(size, Clock::real(), settings, look.seed, tracer)

@@ -21,9 +21,10 @@ pub(crate) fn run(args: &TraceArgs) -> Result<(), Failure> {
             size.height
         )));
     }
-    let (scene, _) = input::lit_scene(&args.scene, &args.open)?;
+    let (scene, opener) = input::lit_scene(&args.scene, &args.open)?;
     let view = ViewSource::Camera(input::camera(&scene, args.camera)?);
-    let world = World::new(Arc::new(scene));
+    let world = World::open(&args.scene, Arc::new(scene), &opener.limits);
+    let world = world.map_err(Failure::bad_input)?;
     let (pixel, settings) = (size.index(x, y), args.light.settings()?);
     let request = match args.sample {
         None => Request::centre(pixel),

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use anyhow::anyhow;
 use frameless::SamplerKind;
-use frameless_scene::Scene;
+use frameless_scene::{LoadError, Scene};
 use frameless_session::Opener;
 use frameless_view::{NoDisplay, PictureSize, Settings, ViewOptions};
 
@@ -33,6 +33,7 @@ pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
     let Some(screenshot) = &args.screenshot else {
         return match frameless_view::run(options) {
             Err(error) if error.is::<NoDisplay>() => serve::instead(&args.look, &error),
+            Err(error) if error.is::<LoadError>() => Err(Failure::bad_input(error)),
             result => Ok(result?),
         };
     };

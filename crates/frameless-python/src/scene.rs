@@ -32,8 +32,8 @@ pub(crate) struct Scene {
 }
 
 impl Scene {
-    fn of(scene: frameless_scene::Scene) -> Scene {
-        Scene { world: Arc::new(World::new(Arc::new(scene))), tracer: Arc::default() }
+    fn of(world: World) -> Scene {
+        Scene { world: Arc::new(world), tracer: Arc::default() }
     }
 
     fn scene(&self) -> &Arc<frameless_scene::Scene> {
@@ -163,7 +163,8 @@ impl Scene {
     /// A scene that comes with the package; Scene.names() lists them.
     #[staticmethod]
     fn builtin(name: &str) -> PyResult<Scene> {
-        builtin(name).map(Scene::of).ok_or_else(|| {
+        let world = builtin(name).map(|scene| World::new(Arc::new(scene)));
+        world.map(Scene::of).ok_or_else(|| {
             let known = BUILTIN_NAMES.join(", ");
             PyValueError::new_err(format!("name: wanted one of {known}; got {name:?}"))
         })
@@ -179,12 +180,15 @@ impl Scene {
                 return Err(PyOSError::new_err(format!("{}: {error}", path.display())));
             }
         }
+        let shown = path.display().to_string();
         let loaded = interruptible(py, move |_| {
-            let mut scene = load(&path, &Limits::default())?;
+            let limits = Limits::default();
+            let mut scene = load(&path, &limits)?;
             if let Some(path) = environment {
-                scene.light_by(load_environment(&path, &Limits::default())?);
+                scene.light_by(load_environment(&path, &limits)?);
             }
-            Ok::<Scene, LoadError>(Scene::of(scene))
+            let world = World::open(&shown, Arc::new(scene), &limits)?;
+            Ok::<Scene, LoadError>(Scene::of(world))
         })?;
         loaded.map_err(|error| PyValueError::new_err(error.to_string()))
     }

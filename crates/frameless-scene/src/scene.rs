@@ -87,6 +87,8 @@ pub struct Contents {
     pub animations: Vec<String>,
     /// Indices of the animations that are played.
     pub played: Vec<usize>,
+    /// Per node of the scene: its number in the file. None of those that were added.
+    pub nodes: Vec<u32>,
 }
 
 /// A shape.

@@ -78,18 +78,18 @@ impl<W: Send + 'static> Loading<W> {
     pub fn start(
         name: String,
         open: impl FnOnce(&str) -> anyhow::Result<Scene> + Send + 'static,
-        prepare: impl FnOnce(&Arc<Scene>) -> W + Send + 'static,
+        prepare: impl FnOnce(&Arc<Scene>) -> anyhow::Result<W> + Send + 'static,
         wake: impl Fn() + Send + 'static,
     ) -> io::Result<Loading<W>> {
         let (report, progress) = channel();
         let wanted = name.clone();
         Builder::new().name("load scene".to_owned()).spawn(move || {
-            let world = open(&wanted).map(|scene| {
+            let world = open(&wanted).and_then(|scene| {
                 report.send(Progress::Stage("building the BVH of")).ok();
                 wake();
                 let scene = Arc::new(scene);
-                let world = prepare(&scene);
-                (scene, world)
+                let world = prepare(&scene)?;
+                Ok((scene, world))
             });
             // Fails if the user has opened something else since.
             report.send(Progress::Done(world)).ok();
@@ -130,7 +130,7 @@ mod tests {
     fn outcome(
         open: impl FnOnce(&str) -> anyhow::Result<Scene> + Send + 'static,
     ) -> Outcome<Arc<World>> {
-        let prepare = |scene: &Arc<Scene>| Arc::new(World::new(Arc::clone(scene)));
+        let prepare = |scene: &Arc<Scene>| Ok(Arc::new(World::new(Arc::clone(scene))));
         let mut loading = Loading::start("x.glb".to_owned(), open, prepare, || {}).unwrap();
         loop {
             match loading.poll() {

@@ -1,100 +1,200 @@
-//! Surfaces that lie on top of each other, so that every ray asks thousands of triangles: nobody can help that, but it can be said.
+//! Surfaces that lie on top of each other, or nearly so: every ray asks each of them. Nobody can help that, but it can be known before a
+//! picture is begun, and refused.
 //!
 //! ```text
-//! E = Σ_leaf A(leaf) / A(all)        A: half the surface of a box; E: leaves that a ray meets on average, of those through the box of all that
-//!                                    nothing stops (the surface area heuristic)
+//! E(n) = Σ_{b below n} w(b) A(b) / A(n)      A: half the surface of a box; w: what a box costs whoever meets it
 //! ```
+//!
+//! is what a ray costs on average, of those through the box of n that nothing stops (the surface area heuristic), in boxes of nodes and
+//! leaves, about 5 ns each. What counts is the subtree with the highest E: a crowd is one wherever in the world it is, and however large
+//! that is.
 
-use frameless_scene::Geometry;
-use glam::{Affine3A, Vec3A};
+use std::sync::Arc;
+
+use frameless_scene::{Limits, LoadError, Place, Problem, Scene};
+use glam::Vec3A;
 
 use crate::build::Blas;
-use crate::wide::{Bounds, NOTHING, Node, half_area, union};
+use crate::leaf::Leaf;
+use crate::moment::Moment;
+use crate::top::{Placed, Shape};
+use crate::wide::{Bounds, Child, NOTHING, Node, half_area, union};
 use crate::world::World;
 
-/// Leaves per ray from which on pictures take long: 5 µs for each ray. Rooms have 2 to 20, bushes and crowds of bodies 100.
-const MANY: f32 = 1000.0;
+/// Of an instance that is entered, besides its tree: the ray is taken there, and has other numbers from then on.
+const OF_INSTANCE: f32 = 16.0;
 
-/// Says it once, of how things stand at time 0.
-pub(crate) fn warn_of_crowds(world: &World) {
-    let leaves = leaves_per_ray(world);
-    if leaves > MANY {
-        log::warn!(
-            "{}: surfaces lie on top of each other, or nearly so: a ray has about {:.0} triangles to ask, and pictures take long",
-            world.scene().name,
-            2.0 * leaves
-        );
-    }
+/// Where most is asked.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Crowd {
+    /// E.
+    pub(crate) boxes: f32,
+    /// One of those in it.
+    instance: usize,
+    secs: f64,
 }
 
-/// E of everything.
-fn leaves_per_ray(world: &World) -> f32 {
-    let (scene, state) = (world.scene(), world.scene().state_at(0.0));
-    let tree_of = |instance: usize| {
-        let geometry = scene.instances[instance].geometry as usize;
-        match (scene.deformation_of(instance), &scene.geometries[geometry]) {
-            (Some(number), _) => Some(&world.deforming[number].tree.blas),
-            (None, Geometry::Mesh(_)) => world.blas[geometry].get(),
-            (None, Geometry::Sphere { .. }) => None,
+impl World {
+    /// The world of a scene that a stranger may have made, as [`World::new`] makes it. `file` is for the message.
+    ///
+    /// # Errors
+    /// If its surfaces lie on top of each other so much that pictures would take long: where, and the limit, see [`Limits::overlap`].
+    pub fn open(file: &str, scene: Arc<Scene>, limits: &Limits) -> Result<World, LoadError> {
+        let world = World::new(scene);
+        world.refuse_crowds(file, limits)?;
+        Ok(world)
+    }
+
+    fn refuse_crowds(&self, file: &str, limits: &Limits) -> Result<(), LoadError> {
+        let Some(crowd) = self.densest() else { return Ok(()) };
+        let (scene, came) = (self.scene(), crowd.boxes as u64);
+        if came <= limits.overlap {
+            if came > Limits::default().overlap {
+                log::warn!(
+                    "{file}: surfaces lie on top of each other, or nearly so: a ray has about {came} boxes to ask, and pictures take long"
+                );
+            }
+            return Ok(());
         }
-    };
-    let mut known: Vec<Option<f32>> = vec![None; scene.geometries.len()];
-    let mut all: Vec<(Bounds, f32)> = Vec::new();
-    if let Some(standing) = &world.standing {
-        all.extend(standing.tree().bounds.map(|bounds| (bounds.into(), in_tree(standing.tree()))));
+        let node = scene.instances[crowd.instance].node as usize;
+        let place = match scene.contents.nodes.get(node) {
+            Some(number) => Place::Pointer(format!("/nodes/{number}")),
+            None => Place::Whole,
+        };
+        let what = match crowd.secs {
+            0.0 => "boxes of surfaces on top of each other for a ray",
+            _ => "boxes of surfaces on top of each other for a ray, as things move",
+        };
+        let problem = Problem::Limit { what, came, limit: limits.overlap };
+        Err(LoadError { file: file.to_owned(), place, problem })
     }
-    for (instance, placed) in scene.instances.iter().enumerate() {
-        let stands = world.standing.as_ref().is_some_and(|standing| standing.has(instance));
-        let Some(tree) = tree_of(instance).filter(|_| !stands) else { continue };
-        let Some(bounds) = tree.bounds else { continue };
-        // Poses of one shape are alike enough.
-        let leaves = known[placed.geometry as usize].get_or_insert_with(|| in_tree(tree));
-        let place = scene.world_from_instance(instance, &state);
-        all.push((around(bounds.into(), &place), *leaves));
+
+    /// Boxes that a ray has to ask where most surfaces lie on top of each other, at a few moments. Rooms have 2 to 100.
+    pub fn overlap(&self) -> u64 {
+        self.densest().map_or(0, |crowd| crowd.boxes as u64)
     }
-    let whole = all.iter().fold(NOTHING, |sum, (bounds, _)| union(sum, *bounds));
-    let part = |(bounds, leaves): &(Bounds, f32)| half_area(*bounds) * leaves;
-    let leaves = all.iter().map(part).sum::<f32>() / half_area(whole);
-    // What is a point, or infinitely large, is met by few.
-    if leaves.is_finite() { leaves } else { 0.0 }
+
+    /// The densest crowd, at a few moments.
+    pub(crate) fn densest(&self) -> Option<Crowd> {
+        /// After the first.
+        const MOMENTS: u32 = 4;
+        let duration = self.scene().animation.duration_secs;
+        let moments = if duration > 0.0 { MOMENTS } else { 0 };
+        let mut moment = self.moment(0.0);
+        let crowds = (0..=moments).filter_map(|k| {
+            let secs = duration * f64::from(k) / f64::from(MOMENTS);
+            self.update_moment(secs, &mut moment);
+            self.densest_at(&moment, secs)
+        });
+        crowds.reduce(denser)
+    }
+
+    fn densest_at(&self, moment: &Moment, secs: f64) -> Option<Crowd> {
+        let targets = moment.targets(self);
+        let mut known: Vec<Option<Sums>> = vec![None; self.scene().geometries.len()];
+        let mut of_instance = |instance: usize, placed: &Placed| {
+            let Some(tree) = targets.trees.of(placed.shape) else { return Sums::default() };
+            match placed.shape {
+                // Poses of one shape are not alike.
+                Shape::Deforming(_) => Sums::of_tree(tree),
+                Shape::Mesh(_) | Shape::Sphere => {
+                    let geometry = self.scene().instances[instance].geometry as usize;
+                    *known[geometry].get_or_insert_with(|| Sums::of_tree(tree))
+                }
+            }
+        };
+        let crowd = |boxes: f32, instance: usize| Crowd { boxes, instance, secs };
+        let mut densest: Option<Crowd> = None;
+        let mut add = |crowd: Crowd| {
+            densest = Some(densest.map_or(crowd, |known| denser(known, crowd)));
+        };
+        let top = Sums::of(&targets.top.nodes, |leaf| {
+            let instance = leaf.place();
+            let sums = of_instance(instance, moment.placed(instance as u32));
+            add(crowd(sums.most, instance));
+            OF_INSTANCE + sums.whole
+        });
+        if let Some(leaf) = top.at {
+            add(crowd(top.most, leaf.place()));
+        }
+        if let Some(standing) = targets.standing {
+            let sums = Sums::of_tree(standing.tree());
+            if let Some(leaf) = sums.at {
+                let number = Leaf::at(&standing.tree().leaves, leaf.place()).triangle(0);
+                add(crowd(sums.most, standing.which(number).0 as usize));
+            }
+        }
+        densest
+    }
 }
 
-/// E of one tree; 1 of what has no extent.
-fn in_tree(tree: &Blas) -> f32 {
-    let Some(bounds) = tree.bounds else { return 0.0 };
-    let leaves = tree.nodes.iter().flat_map(|node| {
-        let is_leaf =
-            |slot: &usize| node.child[*slot] != Node::UNUSED && node.child[*slot].is_leaf();
-        (0..8).filter(is_leaf).map(|slot| {
-            let corner = |side: usize| [0, 1, 2].map(|axis| node.plane(2 * axis + side, slot));
-            half_area([corner(0), corner(1)].map(Vec3A::from_array))
-        })
-    });
-    let ratio = leaves.sum::<f32>() / half_area(bounds.into());
-    if ratio.is_finite() { ratio } else { 1.0 }
+fn denser(a: Crowd, b: Crowd) -> Crowd {
+    if b.boxes > a.boxes { b } else { a }
 }
 
-/// The box around a box that has been moved.
-fn around([low, high]: Bounds, place: &Affine3A) -> Bounds {
-    let corner = |k: usize| {
-        let side = |axis: usize| if k >> axis & 1 == 0 { low[axis] } else { high[axis] };
-        place.transform_point3a(Vec3A::from_array([0, 1, 2].map(side)))
-    };
-    (0..8).map(corner).fold(NOTHING, |sum, corner| union(sum, [corner, corner]))
+/// What is known of a tree.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    /// E of all of it.
+    whole: f32,
+    /// The highest E of its subtrees, and a leaf of that one.
+    most: f32,
+    at: Option<Child>,
+}
+
+impl Sums {
+    fn of_tree(tree: &Blas) -> Sums {
+        Sums::of(&tree.nodes, |_| 1.0)
+    }
+
+    /// `weight`: w of a leaf.
+    fn of(nodes: &[Node], mut weight: impl FnMut(Child) -> f32) -> Sums {
+        let mut sums = Sums::default();
+        // Per node: Σ w A, and the first leaf below it. Parents come before their children.
+        let mut below: Vec<(f32, Option<Child>)> = vec![(0.0, None); nodes.len()];
+        for (index, node) in nodes.iter().enumerate().rev() {
+            let (mut sum, mut leaf, mut around) = (0.0, None, NOTHING);
+            for slot in (0..8).filter(|&slot| node.child[slot] != Node::UNUSED) {
+                let (child, bounds) = (node.child[slot], box_of(node, slot));
+                around = union(around, bounds);
+                if child.is_leaf() {
+                    sum += weight(child) * half_area(bounds);
+                    leaf = leaf.or(Some(child));
+                } else {
+                    let (child_sum, child_leaf) = below[child.node()];
+                    sum += child_sum;
+                    leaf = leaf.or(child_leaf);
+                }
+            }
+            let area = half_area(around);
+            sum += area;
+            below[index] = (sum, leaf);
+            // What is a point, or infinitely large, is met by few.
+            let boxes = Some(sum / area).filter(|boxes| boxes.is_finite()).unwrap_or(0.0);
+            sums.whole = boxes;
+            if boxes > sums.most {
+                (sums.most, sums.at) = (boxes, leaf);
+            }
+        }
+        sums
+    }
+}
+
+fn box_of(node: &Node, slot: usize) -> Bounds {
+    let corner = |side: usize| [0, 1, 2].map(|axis| node.plane(2 * axis + side, slot));
+    [corner(0), corner(1)].map(Vec3A::from_array)
 }
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
-    use frameless_scene::{Mesh, Transform, TriangleMaterials, builtin};
+    use frameless_scene::{Geometry, Mesh, Transform, TriangleMaterials, builtin};
     use glam::Vec3;
 
     use super::*;
     use crate::test_scenes as scenes;
 
-    fn of_copies(triangles: usize, instances: usize) -> f32 {
-        let mesh = Mesh {
+    fn of_copies(triangles: usize, instances: usize, far: f32) -> f32 {
+        let mesh = |triangles| Mesh {
             positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
             triangles: vec![[0, 1, 2]; triangles],
             triangle_materials: TriangleMaterials::all(0, triangles),
@@ -103,18 +203,25 @@ mod tests {
         let mut scene = scenes::empty();
         for k in 0..instances {
             let place = Transform { translation: k as f32 * 1e-6 * Vec3::Z, ..Transform::IDENTITY };
-            scenes::add(&mut scene, Geometry::Mesh(mesh.clone()), place);
+            scenes::add(&mut scene, Geometry::Mesh(mesh(triangles)), place);
         }
-        leaves_per_ray(&World::new(Arc::new(scene)))
+        if far > 0.0 {
+            let place = Transform { translation: far * Vec3::ONE, ..Transform::IDENTITY };
+            scenes::add(&mut scene, Geometry::Mesh(mesh(1)), place);
+        }
+        World::new(Arc::new(scene)).densest().map_or(0.0, |crowd| crowd.boxes)
     }
 
-    /// Four of them in nearly each leaf.
+    /// Four of them in nearly each leaf, and a node for up to eight of these.
     #[test]
-    fn copies_are_counted() {
-        for (triangles, instances) in [(4, 1), (4_000, 1), (4, 1_000), (400, 10)] {
-            let leaves = (triangles * instances) as f32 / 4.0;
-            let found = of_copies(triangles, instances);
-            assert!((0.95..1.25).contains(&(found / leaves)), "{triangles} × {instances}: {found}");
+    fn copies_are_counted_however_large_the_world_is() {
+        for (triangles, instances) in [(4_000, 1), (4, 1_000), (400, 10)] {
+            for far in [0.0, 1e6] {
+                let leaves = (triangles * instances) as f32 / 4.0;
+                let found = of_copies(triangles, instances, far) / leaves;
+                let case = format!("{triangles} × {instances}, {far} m: {found}");
+                assert!((1.1..1.5).contains(&found), "{case}");
+            }
         }
     }
 
@@ -122,8 +229,8 @@ mod tests {
     fn rooms_are_no_crowds() {
         for name in ["many", "shadow"] {
             let world = World::new(Arc::new(builtin(name).expect("it is built in")));
-            let leaves = leaves_per_ray(&world);
-            assert!(leaves < 30.0, "{name}: {leaves}");
+            let boxes = world.densest().map_or(0.0, |crowd| crowd.boxes);
+            assert!(boxes < 200.0, "{name}: {boxes}");
         }
     }
 }

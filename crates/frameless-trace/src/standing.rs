@@ -122,6 +122,11 @@ impl Standing {
         &self.tree
     }
 
+    /// Which instance a triangle of the tree is of, and which of its triangles.
+    pub(crate) fn which(&self, number: u32) -> (u32, u32) {
+        self.numbers.which(number)
+    }
+
     /// Where an instance of the tree stands.
     #[inline]
     pub(crate) fn place(&self, instance: usize) -> Option<&Affine3A> {

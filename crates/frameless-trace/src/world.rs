@@ -9,7 +9,6 @@ use glam::{Affine3A, Vec3A};
 use rayon::prelude::*;
 
 use crate::build::{Blas, OneMesh};
-use crate::crowd::warn_of_crowds;
 use crate::deforming::Deforming;
 use crate::emitters::Emitters;
 use crate::holes::may_have_holes;
@@ -74,7 +73,7 @@ impl World {
             _ => Blas::new(&OneMesh { mesh: &Mesh::default(), place: &Affine3A::IDENTITY }).into(),
         });
         let holes: Vec<bool> = scene.geometries.iter().map(|g| has_holes(&scene, g)).collect();
-        let world = World {
+        World {
             has_holes: holes.contains(&true),
             holes,
             blas: blas.collect(),
@@ -89,9 +88,7 @@ impl World {
             scene,
             isa,
             id: WORLDS.fetch_add(1, Ordering::Relaxed),
-        };
-        warn_of_crowds(&world);
-        world
+        }
     }
 
     /// What comes from far away, along a direction of any length: the environment, else the sky, mixed between straight down and straight up

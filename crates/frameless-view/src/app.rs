@@ -147,8 +147,11 @@ impl App {
         let window = context.clone();
         let wake = move || window.request_repaint();
         let opener = self.options.opener.clone();
+        let limits = opener.limits.clone();
         let open = move |name: &str| opener.open(name);
-        let prepare = |scene: &Arc<Scene>| Arc::new(World::new(Arc::clone(scene)));
+        let prepare = move |scene: &Arc<Scene>| {
+            Ok(Arc::new(World::open(&scene.name, Arc::clone(scene), &limits)?))
+        };
         match Loading::start(name, open, prepare, wake) {
             Ok(loading) => self.loading = Some(loading),
             Err(error) => self.messages.error(error.to_string(), now_secs),

@@ -30,10 +30,12 @@ pub use options::ViewOptions;
 /// Opens the window; returns when the user has closed it.
 ///
 /// # Errors
-/// [`NoDisplay`] if there is none, or none that the graphics driver can draw on.
+/// [`NoDisplay`] if there is none, or none that the graphics driver can draw on; [`LoadError`](frameless_scene::LoadError) if the scene
+/// would take too long to draw.
 pub fn run(options: ViewOptions) -> anyhow::Result<()> {
     no_display::check(|name| std::env::var_os(name))?;
-    let world = Arc::new(World::new(Arc::clone(&options.scene)));
+    let (scene, limits) = (&options.scene, &options.opener.limits);
+    let world = Arc::new(World::open(&scene.name, Arc::clone(scene), limits)?);
     let [width, height] = options.window;
     let window = ViewportBuilder::default()
         .with_title(format!("{} – frameless", options.scene.name))

@@ -19,9 +19,9 @@ pub struct Show<S: Stage> {
 pub struct Scenes<W> {
     /// What uploads may ask for, and the light that they get.
     pub opener: Opener,
-    /// A scene made ready for the renderer; called in a thread of its own.
+    /// A scene made ready for the renderer, unless that is refused; called in a thread of its own.
     pub prepare: Prepare<W>,
 }
 
 /// Makes a scene ready for a renderer.
-pub type Prepare<W> = Arc<dyn Fn(&Arc<Scene>) -> W + Send + Sync>;
+pub type Prepare<W> = Arc<dyn Fn(&Arc<Scene>) -> anyhow::Result<W> + Send + Sync>;

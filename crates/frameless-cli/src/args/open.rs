@@ -90,6 +90,11 @@ pub(crate) struct LimitArgs {
     /// Lights at nodes
     #[arg(long, value_name = "N", default_value_t = Limits::default().lights)]
     max_lights: u64,
+
+    /// Surfaces on top of each other, or nearly so: boxes of the tree over all triangles that a ray has to ask; as often as it
+    /// asks, a picture takes long
+    #[arg(long, value_name = "N", default_value_t = Limits::default().overlap)]
+    max_overlap: u64,
 }
 
 impl Default for LimitArgs {
@@ -103,6 +108,7 @@ impl Default for LimitArgs {
             max_nesting: limits.node_depth,
             max_instances: limits.instances,
             max_lights: limits.lights,
+            max_overlap: limits.overlap,
         }
     }
 }
@@ -128,6 +134,7 @@ impl LimitArgs {
             node_depth: self.max_nesting,
             instances: self.max_instances,
             lights: self.max_lights,
+            overlap: self.max_overlap,
             keyframes: scaled(default.keyframes),
             json_values: scaled(default.json_values),
             ..default

@@ -30,6 +30,9 @@ pub struct Limits {
     pub instances: u64,
     /// Punctual lights at nodes: `direct` looks at every one from every point.
     pub lights: u64,
+    /// Boxes of nodes and leaves that a ray meets, on average, where surfaces lie on top of each other: a picture of 512×384 takes
+    /// seconds. Whoever prepares the scene for rays counts them.
+    pub overlap: u64,
     /// Keys of all animation channels together.
     pub keyframes: u64,
     /// Brackets around the innermost JSON value; more than 127 are refused in any case.
@@ -52,6 +55,7 @@ impl Default for Limits {
             node_depth: 200_000,
             instances: 1_000_000,
             lights: 5_000,
+            overlap: 3_000,
             keyframes: 20_000_000,
             json_depth: 100,
             json_values: 20_000_000,
@@ -281,6 +285,8 @@ pub(super) fn flag_of(what: &str) -> Option<&'static str> {
         "levels of nodes" => "--max-nesting",
         "instances" | "instances from few bytes of file" => "--max-instances",
         "lights" => "--max-lights",
+        "boxes of surfaces on top of each other for a ray"
+        | "boxes of surfaces on top of each other for a ray, as things move" => "--max-overlap",
         _ => return None,
     })
 }

@@ -197,7 +197,8 @@ fn load_contents(root: &Json<'_>, hierarchy: &Hierarchy) -> Result<Contents, Fau
         Ok(root.list(key)?.iter().map(Json::name).collect())
     };
     let (scenes, animations) = (names("scenes")?, names("animations")?);
-    Ok(Contents { scenes, shown_scene: hierarchy.scene, animations, played: Vec::new() })
+    let nodes = hierarchy.file_index.iter().map(|&index| index as u32).collect();
+    Ok(Contents { scenes, shown_scene: hierarchy.scene, animations, played: Vec::new(), nodes })
 }
 
 /// An animation whose only keys are at time 0 has no length and moves nothing: it is a pose.

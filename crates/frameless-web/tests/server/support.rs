@@ -37,9 +37,10 @@ pub(crate) fn start(options: Options) -> Running {
 
 pub(crate) fn start_at(options: Options, size: Size) -> Running {
     let scene = Arc::new(builtin("sphere").expect("built in"));
-    let prepare = |scene: &Arc<Scene>| Arc::new(World::new(Arc::clone(scene)));
+    let prepare = |scene: &Arc<Scene>| Ok(Arc::new(World::new(Arc::clone(scene))));
     let tracing = frameless_trace::Settings::default();
-    let tracer = CpuTracer::new(prepare(&scene), ViewSource::Camera(0), tracing, 1);
+    let world = Arc::new(World::new(Arc::clone(&scene)));
+    let tracer = CpuTracer::new(world, ViewSource::Camera(0), tracing, 1);
     start_with(options, size, tracer, Some(Arc::new(prepare)))
 }
 
