@@ -11,12 +11,16 @@ use crate::many::{Occluded, SHADED};
 use crate::matter::{Matter, coverage};
 use crate::moment::Moment;
 use crate::numbers::{self, mixed};
-use crate::point::{Placement, Point};
+use crate::point::{Placement, Point, looked_at};
 use crate::ray::{Hit, Ray};
 use crate::sift::Sieve;
 use crate::top::Targets;
 use crate::traverse::Stack;
 use crate::world::World;
+
+/// Holes that a ray is asked about; whatever it meets beyond them is there. Woods have a hundred leaves behind each other: a file with
+/// thousands would take seconds for each picture.
+const MOST_ASKED: u32 = 256;
 
 /// How a surface that blends decides whether it is there.
 #[derive(Clone, Copy, Debug)]
@@ -81,7 +85,7 @@ impl World {
                 && moment.placed(hit.instance).has_holes
             {
                 let (chance, culls) = (chance(index), false);
-                if !(Holes { world: self, moment, ray, chance, culls }).stops(hit) {
+                if !(Holes { world: self, moment, ray, chance, culls, asked: 0 }).stops(hit) {
                     *found = self.nearest_through(moment, ray, (chance, culls), stack);
                 }
             }
@@ -114,7 +118,7 @@ impl World {
         (chance, culls): (Chance, bool),
         stack: &mut Stack,
     ) -> Option<Hit> {
-        let mut holes = Holes { world: self, moment, ray, chance, culls };
+        let mut holes = Holes { world: self, moment, ray, chance, culls, asked: 0 };
         moment.targets(self).closest_through(ray, &mut holes, stack)
     }
 
@@ -189,6 +193,7 @@ impl World {
             moment,
             ray,
             through_glass,
+            asked: 0,
             passes: Vec3A::ONE,
             depth: Vec3A::ZERO,
             inside: Vec3A::ZERO,
@@ -208,6 +213,8 @@ struct Holes<'a> {
     chance: Chance,
     /// Whether the backs of single-sided triangles are not there.
     culls: bool,
+    /// How often it has been asked about a hole.
+    asked: u32,
 }
 
 impl Sieve for Holes<'_> {
@@ -216,16 +223,20 @@ impl Sieve for Holes<'_> {
     }
 
     fn stops(&mut self, hit: &Hit) -> bool {
-        let Some(material) = material(self.world, hit) else { return true };
+        let Some((mesh, material)) = surface(self.world, hit) else { return true };
         let asks_side = self.culls && has_no_back(self.world, hit);
         if material.alpha_mode == AlphaMode::Opaque && !asks_side {
             return true;
         }
-        let place = Placement::new(self.world, self.moment, self.ray, hit);
-        if asks_side && !place.is_front {
+        if self.asked == MOST_ASKED {
+            return true;
+        }
+        self.asked += 1;
+        if asks_side && !Placement::new(self.world, self.moment, self.ray, hit).is_front {
             return false;
         }
-        let coverage = coverage(self.world, material, &place.patch, place.color);
+        let (patch, color) = looked_at(self.moment, mesh, hit);
+        let coverage = coverage(self.world, material, &patch, color);
         match (material.alpha_mode, self.chance) {
             (AlphaMode::Blend, Chance::By(number)) => unit(number, hit) < coverage,
             _ => coverage > 0.0,
@@ -239,6 +250,8 @@ struct Shade<'a> {
     moment: &'a Moment,
     ray: &'a Ray,
     through_glass: bool,
+    /// How often it has been asked about a hole.
+    asked: u32,
     passes: Vec3A,
     /// Σ σ · way in what encloses, of leaving minus entering it: in whichever order they are met.
     depth: Vec3A,
@@ -252,15 +265,20 @@ impl Sieve for Shade<'_> {
     }
 
     fn stops(&mut self, hit: &Hit) -> bool {
-        let Some(material) = material(self.world, hit) else { return true };
+        let Some((mesh, material)) = surface(self.world, hit) else { return true };
         let is_clear = material.layers.as_ref().is_some_and(|layers| layers.transmission > 0.0);
         let lets_pass = self.through_glass && is_clear;
         if material.alpha_mode == AlphaMode::Opaque && !lets_pass {
             return true;
         }
-        let place = Placement::new(self.world, self.moment, self.ray, hit);
-        let coverage = coverage(self.world, material, &place.patch, place.color);
+        if self.asked == MOST_ASKED {
+            return true;
+        }
+        self.asked += 1;
+        let (patch, color) = looked_at(self.moment, mesh, hit);
+        let coverage = coverage(self.world, material, &patch, color);
         let through = if lets_pass && coverage > 0.0 {
+            let place = Placement::new(self.world, self.moment, self.ray, hit);
             self.glass(material, &place, hit)
         } else {
             Vec3A::ZERO
@@ -310,17 +328,18 @@ pub(crate) fn has_no_back(world: &World, hit: &Hit) -> bool {
         let layers = material.layers.as_ref();
         layers.is_some_and(|layers| layers.volume.is_some() && layers.transmission > 0.0)
     };
-    material(world, hit).is_some_and(|material| !material.double_sided && !encloses(material))
+    surface(world, hit).is_some_and(|(_, material)| !material.double_sided && !encloses(material))
 }
 
 /// `None` for spheres, which have no holes and no backs.
-fn material<'a>(world: &'a World, hit: &Hit) -> Option<&'a Material> {
+fn surface<'a>(world: &'a World, hit: &Hit) -> Option<(&'a Mesh, &'a Material)> {
     let scene = world.scene();
     let geometry = scene.instances[hit.instance as usize].geometry;
     match &scene.geometries[geometry as usize] {
         Geometry::Sphere { .. } => None,
         Geometry::Mesh(mesh) => {
-            Some(&scene.materials[mesh.triangle_materials[hit.primitive as usize] as usize])
+            let material = mesh.triangle_materials[hit.primitive as usize];
+            Some((mesh, &scene.materials[material as usize]))
         }
     }
 }

@@ -129,6 +129,16 @@ pub(crate) fn is_plain(scene: &Scene, material: &Material) -> bool {
         })
 }
 
+/// The last number of [`base`].
+#[inline]
+fn alpha(world: &World, material: &Material, patch: &Patch<'_>, color: Vec4) -> f32 {
+    let factor = material.base_color.w * color.w;
+    match &material.base_color_texture {
+        None => factor,
+        Some(reference) => factor * patch.look_up_alpha(world, reference),
+    }
+}
+
 /// Linear RGBA of the base colour.
 #[inline]
 fn base(world: &World, material: &Material, patch: &Patch<'_>, color: Vec4) -> Vec4 {
@@ -173,10 +183,13 @@ impl LayersHere {
 pub(crate) fn coverage(world: &World, material: &Material, patch: &Patch<'_>, color: Vec4) -> f32 {
     match material.alpha_mode {
         AlphaMode::Opaque => 1.0,
-        AlphaMode::Blend => base(world, material, patch, color).w,
+        AlphaMode::Blend => alpha(world, material, patch, color),
         AlphaMode::Mask { cutoff } => {
-            let alpha = base(world, material, patch, color).w;
-            if alpha < cutoff { 0.0 } else { 1.0 }
+            if alpha(world, material, patch, color) < cutoff {
+                0.0
+            } else {
+                1.0
+            }
         }
     }
 }

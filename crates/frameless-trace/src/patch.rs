@@ -50,6 +50,24 @@ impl Patch<'_> {
         reference: &TextureRef,
         encoding: Encoding,
     ) -> Vec4 {
+        let (lookup, level) = self.lookup(world, reference, encoding);
+        lookup.at(self.uv(reference), level)
+    }
+
+    /// The alpha of a texture here.
+    #[inline]
+    pub(crate) fn look_up_alpha(&self, world: &World, reference: &TextureRef) -> f32 {
+        let (lookup, level) = self.lookup(world, reference, Encoding::Color);
+        lookup.alpha_at(self.uv(reference), level)
+    }
+
+    #[inline(always)]
+    fn lookup<'w>(
+        &self,
+        world: &'w World,
+        reference: &TextureRef,
+        encoding: Encoding,
+    ) -> (Lookup<'w>, f32) {
         let scene = world.scene();
         let texture = &scene.textures[reference.texture as usize];
         let image = &scene.images[texture.image as usize];
@@ -57,13 +75,15 @@ impl Patch<'_> {
             true => self.level(reference, image.width as f32 * image.height as f32),
             false => 0.0,
         };
-        let lookup = Lookup { texture, image, copies: &world.copies, encoding };
-        lookup.at(self.uv(reference), level)
+        (Lookup { texture, image, copies: &world.copies, encoding }, level)
     }
 
     /// λ; anything where a triangle has no area.
     fn level(&self, reference: &TextureRef, texels: f32) -> f32 {
         let Patch::Triangle { footprint, .. } = *self else { return 0.0 };
+        if footprint == 0.0 {
+            return 0.0;
+        }
         let Some([a, b, c]) = self.corners(reference) else { return 0.0 };
         let area = (b - a).perp_dot(c - a) * reference.picture_from_uv.matrix2.determinant();
         0.5 * (texels * area.abs() * footprint).log2()

@@ -173,6 +173,23 @@ impl<'a> Placement<'a> {
     }
 }
 
+/// The same without its sides: where a mesh's textures are looked up, and the colour of its vertices.
+#[inline]
+pub(crate) fn looked_at<'a>(moment: &Moment, mesh: &'a Mesh, hit: &Hit) -> (Patch<'a>, Vec4) {
+    let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
+    let weights = weights(hit);
+    let patch = Patch::Triangle { mesh, vertices, weights, footprint: 0.0 };
+    let colors = match mesh.colors.is_empty() {
+        true => return (patch, Vec4::ONE),
+        false => match moment.deforming(moment.placed(hit.instance)) {
+            None => &mesh.colors,
+            Some(deforming) => deforming.now().colors(),
+        },
+    };
+    let [a, b, c] = vertices.map(|vertex| Vec4::max(colors[vertex], Vec4::ZERO));
+    (patch, weights[0] * a + weights[1] * b + weights[2] * c)
+}
+
 /// A point's normal, bent by a map.
 fn bend(
     world: &World,

@@ -73,7 +73,8 @@ fn glb(document: &Value, bin: &[u8]) -> Vec<u8> {
 fn survives(what: &str, (document, bin): &(Value, Vec<u8>)) -> Result<(), LoadError> {
     let begin = Instant::now();
     let scene = load_bytes(what, &glb(document, bin), None, &Limits::default())?;
-    let (secs, world) = (scene.animation.duration_secs, World::new(Arc::new(scene)));
+    let secs = scene.animation.duration_secs;
+    let world = World::open(what, Arc::new(scene), &Limits::default())?;
     let pool = thread_pool(0);
     for (secs, integrator) in [
         (0.0, Integrator::Direct),
@@ -306,9 +307,10 @@ fn millions_of_things_of_three_bytes_are_refused() {
     }
 }
 
+/// `direct` looks at every one from every point: 20 s for a picture of 512×384 with 5,000.
 #[test]
-fn twenty_thousand_lights_are_refused_and_five_thousand_are_drawn() {
-    for (count, is_allowed) in [(20_000, false), (5_000, true)] {
+fn five_thousand_lights_are_refused_and_five_hundred_are_drawn() {
+    for (count, is_allowed) in [(20_000, false), (5_000, false), (500, true)] {
         let (mut document, bin) = triangle();
         document["extensions"] =
             json!({"KHR_lights_punctual": {"lights": [{"type": "point", "range": 10}]}});
@@ -324,4 +326,251 @@ fn twenty_thousand_lights_are_refused_and_five_thousand_are_drawn() {
             false => is_refused("lights", &(document, bin), "--max-lights"),
         }
     }
+}
+
+/// Moves node 0, from where it is by a metre, in a second.
+fn add_motion(document: &mut Value, bin: &mut Vec<u8>, nodes: usize) {
+    let input = add_numbers(document, bin, "SCALAR", &[0.0, 1.0]);
+    let output = add_numbers(document, bin, "VEC3", &[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
+    let channel =
+        |node: usize| json!({"sampler": 0, "target": {"node": node, "path": "translation"}});
+    document["animations"] = json!([{
+        "samplers": [{"input": input, "output": output}],
+        "channels": (0..nodes).map(channel).collect::<Vec<_>>(),
+    }]);
+}
+
+/// From 840 bytes: 800 MB, and rays of tens of seconds, as nothing that moves is left out where it stands in one place.
+#[test]
+fn nine_hundred_thousand_instances_that_move_are_refused() {
+    let (mut document, mut bin) = instances(900_000);
+    add_motion(&mut document, &mut bin, 1);
+    is_refused("instances that move", &(document, bin), "--max-instances");
+    // Within what a small file may place, but all in one place.
+    let (mut document, mut bin) = instances(30_000);
+    add_motion(&mut document, &mut bin, 1);
+    is_refused("instances that move in one place", &(document, bin), "--max-overlap");
+}
+
+/// A grid of so many squares along each side, a metre large, with its corners at random heights up to a centimetre.
+fn add_grid(document: &mut Value, bin: &mut Vec<u8>, side: u32) {
+    let mut word = 1u32;
+    let mut height = || {
+        word = word.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (word >> 8) as f32 / 16_777_216.0 * 0.01
+    };
+    let corner = |k: u32| k as f32 / side as f32;
+    let corners: Vec<f32> = (0..=side)
+        .flat_map(|y| (0..=side).map(move |x| (x, y)))
+        .flat_map(|(x, y)| [corner(x), corner(y), height() - 3.0])
+        .collect();
+    let places = add_numbers(document, bin, "VEC3", &corners);
+    let squares = (0..side).flat_map(|y| (0..side).map(move |x| y * (side + 1) + x));
+    let indices: Vec<u8> = squares
+        .flat_map(|a| [a, a + 1, a + side + 1, a + 1, a + side + 2, a + side + 1])
+        .flat_map(u32::to_le_bytes)
+        .collect();
+    let view = json!({"buffer": 0, "byteOffset": bin.len(), "byteLength": indices.len()});
+    bin.extend(&indices);
+    document["buffers"][0]["byteLength"] = json!(bin.len());
+    let view = push(document, "bufferViews", view);
+    let indices = json!({"bufferView": view, "componentType": U32, "type": "SCALAR",
+        "count": indices.len() / 4});
+    let indices = push(document, "accessors", indices);
+    document["meshes"][0]["primitives"][0] =
+        json!({"attributes": {"POSITION": places}, "indices": indices});
+}
+
+/// Tens of seconds for a picture, each ray through all of them: not the same place, so that none is left out.
+#[test]
+fn what_lies_nearly_in_one_place_many_times_is_refused() {
+    let refused = |what: &str, document: Value, bin: Vec<u8>| {
+        is_refused(what, &(document, bin), "--max-overlap");
+    };
+    let at = |step: f64| {
+        let (mut document, mut bin) = triangle();
+        add_grid(&mut document, &mut bin, 100);
+        document["nodes"] = (0..5_000)
+            .map(|k| json!({"mesh": 0, "translation": [0, 0, step * k as f64]}))
+            .collect();
+        document["scenes"][0]["nodes"] = json!((0..5_000).collect::<Vec<_>>());
+        (document, bin)
+    };
+    let (document, bin) = at(1e-6);
+    refused("nodes a micrometre apart", document, bin);
+    // A triangle far away makes the world large, and the crowd a small part of it.
+    let (mut document, bin) = at(1e-6);
+    document["nodes"][0]["translation"] = json!([1e6, 1e6, 1e6]);
+    refused("nodes a micrometre apart in a large world", document, bin);
+    let (mut document, mut bin) = at(1.0);
+    add_motion(&mut document, &mut bin, 5_000);
+    refused("nodes that are moved there", document, bin);
+    let (mut document, mut bin) = triangle();
+    let corners = |k: u16| {
+        let z = -3.0 - f32::from(k) * 1e-6;
+        [[0.0, 0.0, z], [1.0, 0.0, z], [0.0, 1.0, z]]
+    };
+    let corners: Vec<f32> = (0..30_000).flat_map(corners).flatten().collect();
+    let sheets = add_numbers(&mut document, &mut bin, "VEC3", &corners);
+    document["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = json!(sheets);
+    refused("vertices of their own", document, bin);
+}
+
+/// Half a minute, and 1.3 GB.
+#[test]
+fn sixty_four_sets_of_joints_are_counted_for_every_node() {
+    let (mut document, mut bin) = triangle();
+    add_grid(&mut document, &mut bin, 39);
+    let vertices = 40 * 40;
+    let whole = [1.0, 0.0, 0.0, 0.0].repeat(vertices);
+    let weights = add_numbers(&mut document, &mut bin, "VEC4", &whole);
+    let joints = json!({"componentType": 5121, "type": "VEC4", "count": vertices});
+    let joints = push(&mut document, "accessors", joints);
+    let attributes = &mut document["meshes"][0]["primitives"][0]["attributes"];
+    for set in 0..64 {
+        attributes[format!("JOINTS_{set}")] = json!(joints);
+        attributes[format!("WEIGHTS_{set}")] = json!(weights);
+    }
+    document["skins"] = json!([{"joints": [1_000]}]);
+    let nodes = (0..1_000).map(|x| json!({"mesh": 0, "skin": 0, "translation": [x, 0, 0]}));
+    document["nodes"] = nodes.chain([json!({})]).collect();
+    document["scenes"][0]["nodes"] = json!((0..=1_000).collect::<Vec<_>>());
+    is_refused("sets of joints", &(document, bin), "--max-memory");
+}
+
+/// Targets that displace nothing, and weights of them: seconds, and what moves them as much again.
+#[test]
+fn weights_of_many_targets_are_counted_for_every_node() {
+    let with_nodes = |targets: usize, nodes: usize| {
+        let (mut document, bin) = triangle();
+        document["meshes"][0]["primitives"][0]["targets"] = json!(vec![json!({}); targets]);
+        document["nodes"] = json!(vec![json!({"mesh": 0}); nodes]);
+        document["scenes"][0]["nodes"] = json!((0..nodes).collect::<Vec<_>>());
+        (document, bin)
+    };
+    let (mut document, bin) = with_nodes(10_000, 6_500);
+    document["meshes"][0]["weights"] = json!(vec![0; 10_000]);
+    is_refused("weights", &(document, bin), "--max-memory");
+
+    let (mut document, mut bin) = with_nodes(8_000, 700);
+    let input = add_numbers(&mut document, &mut bin, "SCALAR", &[0.0]);
+    let zeros = json!({"componentType": F32, "type": "SCALAR", "count": 8_000});
+    let output = push(&mut document, "accessors", zeros);
+    let channel = |node: usize| json!({"sampler": 0, "target": {"node": node, "path": "weights"}});
+    document["animations"] = json!([{
+        "samplers": [{"input": input, "output": output}],
+        "channels": (0..700).map(channel).collect::<Vec<_>>(),
+    }]);
+    is_refused("weights that move", &(document, bin), "--max-memory");
+}
+
+#[test]
+fn two_hundred_thousand_animations_of_nothing_are_read() {
+    let (mut document, bin) = triangle();
+    document["animations"] = json!(vec![json!({"samplers": [], "channels": []}); 200_000]);
+    is_drawn("animations", &(document, bin));
+}
+
+/// A chunk of a PNG, with a checksum of zeros unless it is looked at.
+fn chunk(kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
+    let step =
+        |crc: u32| (0..8).fold(crc, |crc, _| (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg()));
+    let body = [kind, data].concat();
+    let crc = !body.iter().fold(!0, |crc: u32, byte| step(crc ^ u32::from(*byte)));
+    [&(data.len() as u32).to_be_bytes(), &body[..], &crc.to_be_bytes()].concat()
+}
+
+/// A PNG of one pixel.
+fn png(more_chunks: &[u8]) -> Vec<u8> {
+    // zlib: stored, and the checksum of (0, 7).
+    let data = [0x78, 0x01, 1, 2, 0, 0xfd, 0xff, 0, 7, 0, 9, 0, 8];
+    [
+        b"\x89PNG\r\n\x1a\n",
+        &chunk(b"IHDR", &[0, 0, 0, 1, 0, 0, 0, 1, 8, 0, 0, 0, 0])[..],
+        more_chunks,
+        &chunk(b"IDAT", &data),
+        &chunk(b"IEND", &[]),
+    ]
+    .concat()
+}
+
+/// The triangle with a picture in each of so many materials, all of the bytes of one; each of a view of its own that is some bytes shorter
+/// than the one before, or all of the same.
+fn pictures(count: usize, picture: &[u8], kind: &str, views: usize) -> (Value, Vec<u8>) {
+    let (mut document, mut bin) = triangle();
+    for shorter in 0..views {
+        let length = picture.len() - shorter;
+        let view = json!({"buffer": 0, "byteOffset": bin.len(), "byteLength": length});
+        push(&mut document, "bufferViews", view);
+    }
+    bin.extend(picture);
+    document["buffers"][0]["byteLength"] = json!(bin.len());
+    let image = |k: usize| json!({"bufferView": 1 + k % views, "mimeType": kind});
+    document["images"] = (0..count).map(image).collect();
+    document["textures"] = (0..count).map(|k| json!({"source": k})).collect();
+    let material = |k: usize| json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": k}}});
+    document["materials"] = (0..count).map(material).collect();
+    document["meshes"][0]["primitives"][0]["material"] = json!(0);
+    (document, bin)
+}
+
+/// Six seconds: for each picture all chunks were looked through, twice.
+#[test]
+fn a_png_of_300_000_empty_chunks_in_five_thousand_images_is_looked_through_a_few_times() {
+    let empty = chunk(b"tEXt", &[]).repeat(300_000);
+    let picture = [png(&empty), vec![0; 5_000]].concat();
+    for views in [1, 5_000] {
+        is_drawn("chunks", &pictures(5_000, &picture, "image/png", views));
+    }
+}
+
+/// A progressive JPEG (ITU T.81) of flat channels: a DC scan of each, of which every block is one bit.
+fn progressive_jpeg(side: u16, channels: u8) -> Vec<u8> {
+    let segment = |kind: u8, data: &[u8]| {
+        [&[0xff, kind], &(data.len() as u16 + 2).to_be_bytes()[..], data].concat()
+    };
+    let [high, low] = side.to_be_bytes();
+    let frame = [8, high, low, high, low, channels].into_iter();
+    let frame: Vec<u8> = frame.chain((1..=channels).flat_map(|k| [k, 0x11, 0])).collect();
+    let codes: Vec<u8> = [vec![0x00, 1], vec![0; 15], vec![0]].concat();
+    let mut file = [
+        vec![0xff, 0xd8],
+        segment(0xdb, &[vec![0], vec![1; 64]].concat()),
+        segment(0xc2, &frame),
+        segment(0xc4, &codes),
+    ]
+    .concat();
+    let blocks = usize::from(side / 8).pow(2);
+    for k in 1..=channels {
+        file.extend(segment(0xda, &[1, k, 0, 0, 0, 0]));
+        file.extend(vec![0; blocks.div_ceil(8)]);
+    }
+    file.extend([0xff, 0xd9]);
+    file
+}
+
+/// All of their coefficients are kept until the last scan: 650 MB for four channels.
+#[test]
+fn what_a_progressive_jpeg_takes_is_known_before_it_is_decoded() {
+    for (side, channels, is_drawn) in [(64, 3, true), (7_680, 3, false), (7_680, 4, false)] {
+        let file = pictures(1, &progressive_jpeg(side, channels), "image/jpeg", 1);
+        survives("a progressive JPEG", &file).unwrap_or_else(|error| panic!("{error}"));
+        let scene = load_bytes("a", &glb(&file.0, &file.1), None, &Limits::default());
+        let warnings = scene.expect("it is drawn").warnings.join("\n");
+        let refused = warnings.contains("pixels in images of few bytes");
+        assert_eq!(refused, !is_drawn, "{side}, {channels} channels: {warnings}");
+    }
+}
+
+/// Eight seconds for a picture: each ray looked up the alpha of all of them.
+#[test]
+fn fifteen_hundred_masked_sheets_behind_each_other_are_drawn() {
+    let (mut document, mut bin) = triangle();
+    add_grid(&mut document, &mut bin, 1);
+    document["materials"] = json!([{"alphaMode": "MASK", "alphaCutoff": 2}]);
+    document["meshes"][0]["primitives"][0]["material"] = json!(0);
+    document["nodes"] =
+        (0..1_500).map(|k| json!({"mesh": 0, "translation": [0, 0, -0.01 * k as f64]})).collect();
+    document["scenes"][0]["nodes"] = json!((0..1_500).collect::<Vec<_>>());
+    is_drawn("masked sheets", &(document, bin));
 }

@@ -120,16 +120,31 @@ impl Lookup<'_> {
     /// Texels are decoded before they are mixed.
     #[inline]
     pub(crate) fn at(&self, uv: [f32; 2], level: f32) -> Vec4 {
+        let table = self.encoding.table();
+        self.at_by(uv, level, |[r, g, b, a]| {
+            let [r, g, b] = [r, g, b].map(|code| table[usize::from(code)]);
+            Vec4::new(r, g, b, f32::from(a) * (1.0 / 255.0))
+        })
+    }
+
+    /// The last of these numbers, to the last bit: a ray may pass a thousand masked leaves, of which nothing else is asked.
+    #[inline]
+    pub(crate) fn alpha_at(&self, uv: [f32; 2], level: f32) -> f32 {
+        self.at_by(uv, level, |[.., a]| Vec4::W * (f32::from(a) * (1.0 / 255.0))).w
+    }
+
+    #[inline(always)]
+    fn at_by(&self, uv: [f32; 2], level: f32, decode: impl Fn([u8; 4]) -> Vec4) -> Vec4 {
         // Also where the level is no number.
         if level <= 0.0 || level.is_nan() {
-            return self.texel(self.image, self.texture.filter, uv);
+            return self.texel(self.image, self.texture.filter, uv, decode);
         }
         let Minify { filter, levels } = self.texture.minify;
-        let Some(between) = levels else { return self.texel(self.image, filter, uv) };
+        let Some(between) = levels else { return self.texel(self.image, filter, uv, decode) };
         let copies = self.copies.of(self.texture.image, self.encoding);
         let copy = |number: usize| match number {
-            0 => self.texel(self.image, filter, uv),
-            number => self.texel(&copies[number - 1], filter, uv),
+            0 => self.texel(self.image, filter, uv, &decode),
+            number => self.texel(&copies[number - 1], filter, uv, &decode),
         };
         let level = level.min(copies.len() as f32);
         match between {
@@ -142,8 +157,13 @@ impl Lookup<'_> {
     }
 
     #[inline]
-    fn texel(&self, image: &Image, filter: Filter, uv: [f32; 2]) -> Vec4 {
-        let table = self.encoding.table();
+    fn texel(
+        &self,
+        image: &Image,
+        filter: Filter,
+        uv: [f32; 2],
+        decode: impl Fn([u8; 4]) -> Vec4,
+    ) -> Vec4 {
         let [wrap_u, wrap_v] = self.texture.wrap;
         let (width, height) = (image.width as i32, image.height as i32);
         let x = into_unit(uv[0], wrap_u) * width as f32;
@@ -151,9 +171,7 @@ impl Lookup<'_> {
         let texel = |x: i32, y: i32| {
             let x = neighbour(x, width, wrap_u);
             let y = neighbour(y, height, wrap_v);
-            let [r, g, b, a] = image.rgba[y as usize * width as usize + x as usize];
-            let [r, g, b] = [r, g, b].map(|code| table[usize::from(code)]);
-            Vec4::new(r, g, b, f32::from(a) * (1.0 / 255.0))
+            decode(image.rgba[y as usize * width as usize + x as usize])
         };
         match filter {
             Filter::Nearest => texel(x as i32, y as i32),
@@ -290,6 +308,33 @@ mod tests {
         assert_eq!(at(1.25, Wrap::MirroredRepeat), 1.0);
         assert_eq!(at(-0.75, Wrap::MirroredRepeat), 1.0);
         assert_eq!(at(-0.75, Wrap::Repeat), 0.0);
+    }
+
+    #[test]
+    fn alpha_alone_is_the_same() {
+        let texel = |k: u32| [k * 7 % 256, k * 13 % 256, 0, k * 31 % 256].map(|x| x as u8);
+        let rgba = (0..16).map(texel).collect();
+        let scene = Scene {
+            images: vec![Image { width: 4, height: 4, rgba }],
+            textures: vec![Texture {
+                image: 0,
+                wrap: [Wrap::Repeat; 2],
+                filter: Filter::Linear,
+                minify: Minify::TRILINEAR,
+            }],
+            materials: vec![Material {
+                base_color_texture: Some(TextureRef::plain(0)),
+                ..Material::default()
+            }],
+            ..Scene::default()
+        };
+        let (copies, encoding) = (Copies::new(&scene), Encoding::Color);
+        let (texture, image) = (&scene.textures[0], &scene.images[0]);
+        let lookup = Lookup { texture, image, copies: &copies, encoding };
+        for k in 0..100 {
+            let (uv, level) = ([k as f32 * 0.037, k as f32 * 0.111], k as f32 * 0.05 - 1.0);
+            assert_eq!(lookup.alpha_at(uv, level), lookup.at(uv, level).w, "{k}");
+        }
     }
 
     #[test]
