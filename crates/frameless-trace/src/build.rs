@@ -194,8 +194,21 @@ fn fits(corners: impl Fn(u32) -> [Corner; 3], triangles: &[u32]) -> bool {
 pub(crate) fn binary_tree(count: u32, boxes: impl Fn(u32) -> Aabb, reinserted: f32) -> Bvh2 {
     let mut binary = sah::divide(count, &boxes);
     drop(boxes);
-    ReinsertionOptimizer::default().run(&mut binary, reinserted, None);
+    if !is_crowded(&binary) {
+        ReinsertionOptimizer::default().run(&mut binary, reinserted, None);
+    }
     binary
+}
+
+/// Whether so many boxes lie on top of each other that there are no better places for them, and looking for some takes seconds for half a
+/// million.
+fn is_crowded(binary: &Bvh2) -> bool {
+    /// Boxes that a ray through the box around all meets. Of rooms, bushes and crowds of bodies it is a hundred.
+    const MANY: f32 = 1000.0;
+    let Some(root) = binary.nodes.first() else { return false };
+    let leaves = binary.nodes.iter().filter(|node| node.is_leaf());
+    let sum: f32 = leaves.map(|node| node.aabb().half_area()).sum();
+    sum > MANY * root.aabb().half_area()
 }
 
 /// What a tree with a box per leaf was made of.
