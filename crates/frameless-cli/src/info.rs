@@ -23,8 +23,8 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     let limits = args.limits.limits();
     let scene = Arc::new(input::scene(&args.scene, &args.choice, &limits)?);
     // Whether it can be drawn is known when it has been made ready for that.
-    let world = World::open(&args.scene, Arc::clone(&scene), &limits);
-    let overlap = world.map_err(Failure::bad_input)?.overlap();
+    let world = World::new(Arc::clone(&scene));
+    let overlap = world.check_overlap(&args.scene, &limits).map_err(Failure::bad_input)?;
     Ok(output::print(&describe(&scene, overlap))?)
 }
 

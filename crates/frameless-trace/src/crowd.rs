@@ -26,9 +26,9 @@ const OF_INSTANCE: f32 = 16.0;
 
 /// Where most is asked.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Crowd {
+struct Crowd {
     /// E.
-    pub(crate) boxes: f32,
+    boxes: f32,
     /// One of those in it.
     instance: usize,
     secs: f64,
@@ -41,20 +41,31 @@ impl World {
     /// If its surfaces lie on top of each other so much that pictures would take long: where, and the limit, see [`Limits::overlap`].
     pub fn open(file: &str, scene: Arc<Scene>, limits: &Limits) -> Result<World, LoadError> {
         let world = World::new(scene);
-        world.refuse_crowds(file, limits)?;
+        world.check_overlap(file, limits)?;
         Ok(world)
     }
 
-    fn refuse_crowds(&self, file: &str, limits: &Limits) -> Result<(), LoadError> {
-        let Some(crowd) = self.densest() else { return Ok(()) };
-        let (scene, came) = (self.scene(), crowd.boxes as u64);
-        if came <= limits.overlap {
-            if came > Limits::default().overlap {
+    /// Boxes that a ray has to ask where most surfaces lie on top of each other, at a few moments. Rooms have 2 to 100.
+    ///
+    /// # Errors
+    /// As of [`World::open`].
+    pub fn check_overlap(&self, file: &str, limits: &Limits) -> Result<u64, LoadError> {
+        /// As if there were two lights: `direct` asks all of them from every point.
+        const RAYS: u64 = 3;
+        let Some(crowd) = self.densest(limits.overlap) else { return Ok(0) };
+        let (scene, boxes) = (self.scene(), crowd.boxes as u64);
+        let of_all_rays = boxes.saturating_mul(1 + scene.lights.len() as u64);
+        let (limit, came) = match boxes <= limits.overlap {
+            true => (limits.overlap.saturating_mul(RAYS), of_all_rays),
+            false => (limits.overlap, boxes),
+        };
+        if came <= limit {
+            if boxes > Limits::default().overlap {
                 log::warn!(
-                    "{file}: surfaces lie on top of each other, or nearly so: a ray has about {came} boxes to ask, and pictures take long"
+                    "{file}: surfaces lie on top of each other, or nearly so: a ray has about {boxes} boxes to ask, and pictures take long"
                 );
             }
-            return Ok(());
+            return Ok(boxes);
         }
         let node = scene.instances[crowd.instance].node as usize;
         let place = match scene.contents.nodes.get(node) {
@@ -62,31 +73,31 @@ impl World {
             None => Place::Whole,
         };
         let what = match crowd.secs {
+            _ if boxes <= limits.overlap => "boxes of surfaces for the rays to all lights",
             0.0 => "boxes of surfaces on top of each other for a ray",
             _ => "boxes of surfaces on top of each other for a ray, as things move",
         };
-        let problem = Problem::Limit { what, came, limit: limits.overlap };
+        let problem = Problem::Limit { what, came, limit };
         Err(LoadError { file: file.to_owned(), place, problem })
     }
 
-    /// Boxes that a ray has to ask where most surfaces lie on top of each other, at a few moments. Rooms have 2 to 100.
-    pub fn overlap(&self) -> u64 {
-        self.densest().map_or(0, |crowd| crowd.boxes as u64)
-    }
-
-    /// The densest crowd, at a few moments.
-    pub(crate) fn densest(&self) -> Option<Crowd> {
+    /// The densest crowd, at a few moments, or the first that is denser than `enough`.
+    fn densest(&self, enough: u64) -> Option<Crowd> {
         /// After the first.
         const MOMENTS: u32 = 4;
         let duration = self.scene().animation.duration_secs;
         let moments = if duration > 0.0 { MOMENTS } else { 0 };
         let mut moment = self.moment(0.0);
-        let crowds = (0..=moments).filter_map(|k| {
+        let mut densest = None;
+        for k in 0..=moments {
             let secs = duration * f64::from(k) / f64::from(MOMENTS);
             self.update_moment(secs, &mut moment);
-            self.densest_at(&moment, secs)
-        });
-        crowds.reduce(denser)
+            densest = densest.into_iter().chain(self.densest_at(&moment, secs)).reduce(denser);
+            if densest.is_some_and(|crowd| crowd.boxes as u64 > enough) {
+                break;
+            }
+        }
+        densest
     }
 
     fn densest_at(&self, moment: &Moment, secs: f64) -> Option<Crowd> {
@@ -150,34 +161,77 @@ impl Sums {
     /// `weight`: w of a leaf.
     fn of(nodes: &[Node], mut weight: impl FnMut(Child) -> f32) -> Sums {
         let mut sums = Sums::default();
-        // Per node: Σ w A, and the first leaf below it. Parents come before their children.
-        let mut below: Vec<(f32, Option<Child>)> = vec![(0.0, None); nodes.len()];
+        // Per node: all of it, itself included. Parents come before their children.
+        let mut below: Vec<Part> = vec![Part::NONE; nodes.len()];
         for (index, node) in nodes.iter().enumerate().rev() {
-            let (mut sum, mut leaf, mut around) = (0.0, None, NOTHING);
-            for slot in (0..8).filter(|&slot| node.child[slot] != Node::UNUSED) {
-                let (child, bounds) = (node.child[slot], box_of(node, slot));
-                around = union(around, bounds);
-                if child.is_leaf() {
-                    sum += weight(child) * half_area(bounds);
-                    leaf = leaf.or(Some(child));
-                } else {
-                    let (child_sum, child_leaf) = below[child.node()];
-                    sum += child_sum;
-                    leaf = leaf.or(child_leaf);
+            let slots = (0..8).filter(|&slot| node.child[slot] != Node::UNUSED);
+            let children = slots.map(|slot| {
+                let child = node.child[slot];
+                if !child.is_leaf() {
+                    // With its own box: this node's steps may be longer than that is.
+                    return below[child.node()];
                 }
+                let bounds = box_of(node, slot);
+                Part { bounds, sum: weight(child) * half_area(bounds), leaf: Some(child) }
+            });
+            let (mut parts, mut count) = ([Part::NONE; 8], 0);
+            for part in children {
+                parts[count] = part;
+                count += 1;
             }
-            let area = half_area(around);
-            sum += area;
-            below[index] = (sum, leaf);
-            // What is a point, or infinitely large, is met by few.
-            let boxes = Some(sum / area).filter(|boxes| boxes.is_finite()).unwrap_or(0.0);
-            sums.whole = boxes;
-            if boxes > sums.most {
-                (sums.most, sums.at) = (boxes, leaf);
+            let parts = &parts[..count];
+            let all = together(parts.iter());
+            below[index] = Part { sum: all.sum + half_area(all.bounds), ..all };
+            sums.whole = all.boxes();
+            // A child far away is no reason to take the others apart.
+            let of_neighbours = parts
+                .iter()
+                .map(|part| together(parts.iter().filter(|other| part.is_where(other))));
+            for crowd in of_neighbours.chain([all]) {
+                let boxes = crowd.boxes();
+                if boxes > sums.most {
+                    (sums.most, sums.at) = (boxes, crowd.leaf);
+                }
             }
         }
         sums
     }
+}
+
+/// Some of a node's children.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    bounds: Bounds,
+    /// Σ w A.
+    sum: f32,
+    /// One of those below.
+    leaf: Option<Child>,
+}
+
+impl Part {
+    const NONE: Part = Part { bounds: NOTHING, sum: 0.0, leaf: None };
+
+    /// Whether both are in one place: a box around them is hardly larger than one of them.
+    fn is_where(&self, other: &Part) -> bool {
+        const MOST_GROWTH: f32 = 1.5;
+        let larger = half_area(self.bounds).max(half_area(other.bounds));
+        half_area(union(self.bounds, other.bounds)) <= MOST_GROWTH * larger
+    }
+
+    /// E, with the box around all of it.
+    fn boxes(&self) -> f32 {
+        let ratio = 1.0 + self.sum / half_area(self.bounds);
+        // What is a point, or infinitely large, is met by few.
+        if ratio.is_finite() { ratio } else { 0.0 }
+    }
+}
+
+fn together<'a>(parts: impl Iterator<Item = &'a Part>) -> Part {
+    parts.fold(Part::NONE, |all, part| Part {
+        bounds: union(all.bounds, part.bounds),
+        sum: all.sum + part.sum,
+        leaf: all.leaf.or(part.leaf),
+    })
 }
 
 fn box_of(node: &Node, slot: usize) -> Bounds {
@@ -209,7 +263,7 @@ mod tests {
             let place = Transform { translation: far * Vec3::ONE, ..Transform::IDENTITY };
             scenes::add(&mut scene, Geometry::Mesh(mesh(1)), place);
         }
-        World::new(Arc::new(scene)).densest().map_or(0.0, |crowd| crowd.boxes)
+        World::new(Arc::new(scene)).densest(u64::MAX).map_or(0.0, |crowd| crowd.boxes)
     }
 
     /// Four of them in nearly each leaf, and a node for up to eight of these.
@@ -229,7 +283,7 @@ mod tests {
     fn rooms_are_no_crowds() {
         for name in ["many", "shadow"] {
             let world = World::new(Arc::new(builtin(name).expect("it is built in")));
-            let boxes = world.densest().map_or(0.0, |crowd| crowd.boxes);
+            let boxes = world.densest(u64::MAX).map_or(0.0, |crowd| crowd.boxes);
             assert!(boxes < 200.0, "{name}: {boxes}");
         }
     }

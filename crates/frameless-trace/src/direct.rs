@@ -32,6 +32,9 @@ use crate::world::World;
 const MOST_LAYERS: u32 = 16;
 /// Ways besides the first one that a sample follows.
 const MOST_BRANCHES: u32 = 32;
+/// Lights that are asked for one sample, each time that one is; the first surface asks all of them in any case. Of up to 18 lights all ways have
+/// all. A room of mirrors with hundreds would take ten seconds for a picture.
+const MOST_ASKED: u32 = 600;
 /// Of what a way leads to, less would hardly be seen.
 const LEAST_SHOWN: f32 = 1.0 / 512.0;
 
@@ -75,6 +78,8 @@ struct Picture {
     first: FirstSurface,
     waiting: Vec<Leg>,
     branches: u32,
+    /// Lights that have been asked.
+    asked: u32,
 }
 
 /// What a leg has seen.
@@ -145,6 +150,7 @@ impl World {
                 match self.meet(picture, met, settings, probe) {
                     Seen::All { goes_on } => goes_on,
                     Seen::Lit(lit) => {
+                        picture.may_ask(moment.lights.len());
                         self.leave(moment, picture, met, (&lit, asked), settings, probe)
                     }
                 }
@@ -200,7 +206,10 @@ impl World {
         match self.meet(picture, met, settings, probe) {
             Seen::All { goes_on } => goes_on,
             Seen::Lit(lit) => {
-                let asked = self.ask_lights(moment, point, settings, stack, probe, |_| ());
+                let asked = match picture.may_ask(moment.lights.len()) {
+                    true => self.ask_lights(moment, point, settings, stack, probe, |_| ()),
+                    false => Asked::NOBODY,
+                };
                 self.leave(moment, picture, met, (&lit, &asked), settings, probe)
             }
         }
@@ -303,7 +312,18 @@ impl Picture {
     #[inline(always)]
     fn new(ray: Ray, cone: Cone, settings: &Settings) -> Picture {
         let (leg, first) = (Leg::from_camera(ray, cone), FirstSurface::new(settings.surfaces));
-        Picture { leg, radiance: Vec3A::ZERO, first, waiting: Vec::new(), branches: 0 }
+        Picture { leg, radiance: Vec3A::ZERO, first, waiting: Vec::new(), branches: 0, asked: 0 }
+    }
+
+    /// Takes note that so many lights are asked, if they may be.
+    #[inline(always)]
+    fn may_ask(&mut self, lights: usize) -> bool {
+        let all = self.asked.saturating_add(lights as u32);
+        let may = self.asked == 0 || all <= MOST_ASKED;
+        if may {
+            self.asked = all;
+        }
+        may
     }
 
     /// Told of every surface. A veil of which less than half is there leaves the sample to what is behind.

@@ -21,6 +21,9 @@ use crate::world::World;
 /// Holes that a ray is asked about; whatever it meets beyond them is there. Woods have a hundred leaves behind each other: a file with
 /// thousands would take seconds for each picture.
 const MOST_ASKED: u32 = 256;
+/// The same of a ray to a light: so many of all rays from one point, but of each no fewer than the first and no more than the second.
+const MOST_ASKED_OF_LIGHTS: u32 = 512;
+const ASKED_OF_LIGHT: [u32; 2] = [4, 128];
 
 /// How a surface that blends decides whether it is there.
 #[derive(Clone, Copy, Debug)]
@@ -188,12 +191,13 @@ impl World {
         through_glass: bool,
         stack: &mut Stack,
     ) -> Vec3A {
+        let (lights, [least, most]) = (moment.lights.len() as u32, ASKED_OF_LIGHT);
         let mut shade = Shade {
             world: self,
             moment,
             ray,
             through_glass,
-            asked: 0,
+            left: (MOST_ASKED_OF_LIGHTS / lights.max(1)).clamp(least, most),
             passes: Vec3A::ONE,
             depth: Vec3A::ZERO,
             inside: Vec3A::ZERO,
@@ -250,8 +254,8 @@ struct Shade<'a> {
     moment: &'a Moment,
     ray: &'a Ray,
     through_glass: bool,
-    /// How often it has been asked about a hole.
-    asked: u32,
+    /// How often it may be asked about a hole.
+    left: u32,
     passes: Vec3A,
     /// Σ σ · way in what encloses, of leaving minus entering it: in whichever order they are met.
     depth: Vec3A,
@@ -271,10 +275,10 @@ impl Sieve for Shade<'_> {
         if material.alpha_mode == AlphaMode::Opaque && !lets_pass {
             return true;
         }
-        if self.asked == MOST_ASKED {
+        if self.left == 0 {
             return true;
         }
-        self.asked += 1;
+        self.left -= 1;
         let (patch, color) = looked_at(self.moment, mesh, hit);
         let coverage = coverage(self.world, material, &patch, color);
         let through = if lets_pass && coverage > 0.0 {

@@ -6,10 +6,15 @@ use crate::{Camera, FARTHEST_M, Projection};
 
 use super::error::Fault;
 use super::json::Json;
+use super::limits::Budget;
 use super::node::Hierarchy;
 
 /// The cameras at nodes of the scene, in the order of those nodes.
-pub(super) fn load_cameras(root: &Json<'_>, hierarchy: &Hierarchy) -> Result<Vec<Camera>, Fault> {
+pub(super) fn load_cameras(
+    root: &Json<'_>,
+    hierarchy: &Hierarchy,
+    budget: &mut Budget,
+) -> Result<Vec<Camera>, Fault> {
     let definitions = root.list("cameras")?;
     let projections = definitions.iter().map(parse_projection).collect::<Result<Vec<_>, _>>()?;
     let mut cameras = Vec::new();
@@ -19,6 +24,9 @@ pub(super) fn load_cameras(root: &Json<'_>, hierarchy: &Hierarchy) -> Result<Vec
         let Some(index) = hierarchy.index_of[file_index] else { continue };
         let name = Some(definitions[camera].name()).filter(|name| !name.is_empty());
         let name = name.unwrap_or_else(|| node.name());
+        // Many nodes may have one camera, with one long name.
+        budget.allocate(node.pointer(), size_of::<Camera>() + name.len(), 1)?;
+        let name = name.to_owned();
         cameras.push(Camera { name, node: index, projection: projections[camera] });
     }
     Ok(cameras)

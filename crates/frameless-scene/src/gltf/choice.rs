@@ -85,7 +85,7 @@ fn said(list: &[Json<'_>], what: &str) -> String {
     const NAMES_SHOWN: usize = 8;
     let names = list.iter().take(NAMES_SHOWN).enumerate();
     let names: Vec<String> =
-        names.map(|(index, json)| format!("{index} {}", quoted(&json.name()))).collect();
+        names.map(|(index, json)| format!("{index} {}", quoted(json.name()))).collect();
     let more = if list.len() > NAMES_SHOWN { ", …" } else { "" };
     let colon = if names.is_empty() { "" } else { ": " };
     format!("{} {what}s{colon}{}{more}", list.len(), names.join(", "))

@@ -173,13 +173,13 @@ impl<'a> Json<'a> {
     }
 
     /// The `name` member; empty if it is not there or no string, since nothing depends on it.
-    pub(super) fn name(&self) -> String {
-        self.value.get("name").and_then(Value::as_str).unwrap_or_default().to_owned()
+    pub(super) fn name(&self) -> &'a str {
+        self.value.get("name").and_then(Value::as_str).unwrap_or_default()
     }
 
     /// How a message calls this value: `mesh "wheel" (/meshes/3)`, or `/meshes/3` if it has no name.
     pub(super) fn called(&self, what: &str) -> String {
-        called(what, &self.name(), &self.pointer)
+        called(what, self.name(), &self.pointer)
     }
 }
 

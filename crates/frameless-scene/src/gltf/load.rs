@@ -163,7 +163,7 @@ fn build(document: &mut Document<'_>, choice: &Choice) -> Result<Scene, Fault> {
     add_default_material(&mut scene);
     let skins = load_skins(document, &hierarchy)?;
     let weights_of = place_instances(&mut scene, document, &mut hierarchy, skins, meshes.same_as)?;
-    scene.cameras = load_cameras(&root, &hierarchy)?;
+    scene.cameras = load_cameras(&root, &hierarchy, &mut document.budget)?;
     scene.lights = load_lights(&root, &hierarchy, &limits)?;
     scene.contents = load_contents(&root, &hierarchy)?;
     let nodes = Nodes { hierarchy: &hierarchy, weights_of: &weights_of };
@@ -194,7 +194,7 @@ fn add_default_material(scene: &mut Scene) {
 /// Names of what can be chosen.
 fn load_contents(root: &Json<'_>, hierarchy: &Hierarchy) -> Result<Contents, Fault> {
     let names = |key: &str| -> Result<Vec<String>, Fault> {
-        Ok(root.list(key)?.iter().map(Json::name).collect())
+        Ok(root.list(key)?.iter().map(|json| json.name().to_owned()).collect())
     };
     let (scenes, animations) = (names("scenes")?, names("animations")?);
     let nodes = hierarchy.file_index.iter().map(|&index| index as u32).collect();

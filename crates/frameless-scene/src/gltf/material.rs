@@ -27,7 +27,7 @@ fn load_material(
 ) -> Result<Material, Fault> {
     let owner = json.called("material");
     let mut material = Material {
-        name: json.name(),
+        name: json.name().to_owned(),
         metallic: 1.0,
         double_sided: json.flag("doubleSided")?,
         alpha_mode: load_alpha_mode(json)?,

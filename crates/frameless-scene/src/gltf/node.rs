@@ -49,7 +49,7 @@ pub(super) fn load_nodes(
     for (index, &file_index) in order.iter().enumerate() {
         hierarchy.index_of[file_index] = Some(index as u32);
         let parent = family.parent[file_index].and_then(|parent| hierarchy.index_of[parent]);
-        let name = file_nodes[file_index].name();
+        let name = file_nodes[file_index].name().to_owned();
         hierarchy.nodes.push(Node { name, parent, rest: rest[file_index] });
     }
     hierarchy.file_index = order;

@@ -37,7 +37,7 @@ fn load_skin(
     }
     let inverse_bind = load_inverse_bind(json, joints.len(), document)?;
     let joints: Option<Vec<u32>> = joints.into_iter().collect();
-    Ok(joints.map(|joints| Skin { name: json.name(), joints, inverse_bind }))
+    Ok(joints.map(|joints| Skin { name: json.name().to_owned(), joints, inverse_bind }))
 }
 
 /// One matrix per joint; without any in the file, nothing is undone.
