@@ -175,7 +175,7 @@ fn instances(count: u32) -> (Value, Vec<u8>) {
 fn half_a_billion_instances_are_refused_and_a_hundred_thousand_in_one_place_are_drawn() {
     let refusal = survives("many", &instances(500_000_000)).expect_err("beyond the limit");
     let text = refusal.to_string();
-    assert!(text.contains("500000000 instances, more than the limit of 600000"), "{text}");
+    assert!(text.contains("500000000 instances, more than the limit of 500000"), "{text}");
     assert!(text.contains("/nodes/0/extensions/EXT_mesh_gpu_instancing"), "{text}");
     // Every ray meets them all: few are enough to see that the tree over them is built in time.
     is_drawn("instances in one place", &instances(30_000));

@@ -53,7 +53,7 @@ impl Default for Limits {
             total_pixels: 500_000_000,
             nodes: 1_000_000,
             node_depth: 200_000,
-            instances: 600_000,
+            instances: 500_000,
             lights: 500,
             overlap: 3_000,
             keyframes: 20_000_000,
@@ -173,7 +173,7 @@ impl Budget {
     /// `count` instances of one node are about to be placed, by accessors that may have no data, or share it.
     pub(super) fn place_instances(&mut self, pointer: &str, count: usize) -> Result<(), Fault> {
         /// Of all instances, those that may come from next to nothing: by default 50,000. A file of 800 bytes could place a million.
-        const SHARE: u64 = 12;
+        const SHARE: u64 = 10;
         /// A place is three numbers of four bytes, or of two, compressed.
         const BYTES_PER_INSTANCE: u64 = 8;
         within(count as u64, self.limits.instances, "instances", pointer)?;
