@@ -519,3 +519,22 @@ fn describe(point: &Point, material: &Material, shares: &Shares) -> String {
         matter.emissive,
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_surface_asks_all_lights_and_the_others_what_is_left() {
+        let picture = || Picture::new(Ray::NONE, Cone::default(), &Settings::default());
+        let mut many = picture();
+        assert!(many.may_ask(100_000));
+        assert!(!many.may_ask(1));
+        let mut few = picture();
+        // 33 ways: as many as there are.
+        assert!((0..=MOST_BRANCHES).all(|_| few.may_ask(18)));
+        let mut some = picture();
+        let asked = (0..=MOST_BRANCHES).filter(|_| some.may_ask(100)).count();
+        assert_eq!(asked, 6);
+    }
+}

@@ -352,3 +352,47 @@ fn surface<'a>(world: &'a World, hit: &Hit) -> Option<(&'a Mesh, &'a Material)> 
 fn unit(number: u32, hit: &Hit) -> f32 {
     numbers::unit(mixed(number ^ mixed(hit.instance ^ mixed(hit.primitive))))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::{Vec3, Vec4};
+
+    use super::*;
+    use crate::test_scenes as scenes;
+
+    /// Masked sheets of which nothing is there, above a floor, which is the first instance.
+    fn sheets(count: u32) -> World {
+        let mut scene = scenes::empty();
+        let solid = scenes::add_material(&mut scene, Vec3::ONE, 0.0, 1.0);
+        scene.materials.push(Material {
+            base_color: Vec4::ONE,
+            alpha_mode: AlphaMode::Mask { cutoff: 2.0 },
+            double_sided: true,
+            ..Material::default()
+        });
+        scenes::add(&mut scene, scenes::floor(1.0, -1.0, solid), scenes::at(0.0, 0.0, 0.0));
+        for k in 0..count {
+            let place = scenes::at(0.0, 1e-3 * k as f32, 0.0);
+            scenes::add(&mut scene, scenes::floor(1.0, 0.0, solid + 1), place);
+        }
+        World::new(Arc::new(scene))
+    }
+
+    #[test]
+    fn a_ray_passes_so_many_holes_and_no_more() {
+        let ray = Ray { origin: Vec3A::new(0.1, 5.0, 0.2), direction: Vec3A::NEG_Y };
+        for (count, nearest_passes, light_passes) in
+            [(100, true, true), (200, true, false), (300, false, false)]
+        {
+            let (world, mut stack) = (sheets(count), Stack::new());
+            let moment = world.moment(0.0);
+            let hit = world.nearest(&moment, &ray, || Chance::Never, &mut stack).expect("a floor");
+            assert_eq!(hit.instance == 0, nearest_passes, "{count}: {hit:?}");
+            // To just above the floor.
+            let passes = world.passing(&moment, &ray, 5.9, true, &mut stack);
+            assert_eq!(passes == Vec3A::ONE, light_passes, "{count}: {passes}");
+        }
+    }
+}
