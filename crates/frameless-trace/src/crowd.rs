@@ -12,9 +12,9 @@
 use std::sync::Arc;
 
 use frameless_scene::{Limits, LoadError, Place, Problem, Scene};
-use glam::Vec3A;
+use glam::{Vec3, Vec3A};
 
-use crate::build::Blas;
+use crate::build::{Blas, TightBox};
 use crate::leaf::Leaf;
 use crate::moment::Moment;
 use crate::top::{Placed, Shape};
@@ -162,14 +162,14 @@ impl Sums {
     fn of(nodes: &[Node], mut weight: impl FnMut(Child) -> f32) -> Sums {
         let mut sums = Sums::default();
         // Per node: all of it, itself included. Parents come before their children.
-        let mut below: Vec<Part> = vec![Part::NONE; nodes.len()];
+        let mut below: Vec<Kept> = vec![Part::NONE.kept(); nodes.len()];
         for (index, node) in nodes.iter().enumerate().rev() {
             let slots = (0..8).filter(|&slot| node.child[slot] != Node::UNUSED);
             let children = slots.map(|slot| {
                 let child = node.child[slot];
                 if !child.is_leaf() {
                     // With its own box: this node's steps may be longer than that is.
-                    return below[child.node()];
+                    return below[child.node()].part();
                 }
                 let bounds = box_of(node, slot);
                 Part { bounds, sum: weight(child) * half_area(bounds), leaf: Some(child) }
@@ -181,7 +181,7 @@ impl Sums {
             }
             let parts = &parts[..count];
             let all = together(parts.iter());
-            below[index] = Part { sum: all.sum + half_area(all.bounds), ..all };
+            below[index] = Part { sum: all.sum + half_area(all.bounds), ..all }.kept();
             sums.whole = all.boxes();
             // A child far away is no reason to take the others apart.
             let of_neighbours = parts
@@ -198,6 +198,22 @@ impl Sums {
     }
 }
 
+/// A [`Part`] in fewer bytes: of a large tree there are many.
+#[derive(Clone, Copy)]
+struct Kept {
+    bounds: TightBox,
+    sum: f32,
+    leaf: Child,
+}
+
+impl Kept {
+    fn part(&self) -> Part {
+        let Kept { bounds, sum, leaf } = *self;
+        let leaf = (leaf != Node::UNUSED).then_some(leaf);
+        Part { bounds: bounds.map(Vec3A::from), sum, leaf }
+    }
+}
+
 /// Some of a node's children.
 #[derive(Clone, Copy, Debug)]
 struct Part {
@@ -210,6 +226,11 @@ struct Part {
 
 impl Part {
     const NONE: Part = Part { bounds: NOTHING, sum: 0.0, leaf: None };
+
+    fn kept(&self) -> Kept {
+        let Part { bounds, sum, leaf } = *self;
+        Kept { bounds: bounds.map(Vec3::from), sum, leaf: leaf.unwrap_or(Node::UNUSED) }
+    }
 
     /// Whether both are in one place: a box around them is hardly larger than one of them.
     fn is_where(&self, other: &Part) -> bool {
@@ -241,11 +262,9 @@ fn box_of(node: &Node, slot: usize) -> Bounds {
 
 #[cfg(test)]
 mod tests {
-    use frameless_scene::{Geometry, Mesh, Transform, TriangleMaterials, builtin};
-    use glam::Vec3;
-
     use super::*;
     use crate::test_scenes as scenes;
+    use frameless_scene::{Geometry, Mesh, Transform, TriangleMaterials, builtin};
 
     fn of_copies(triangles: usize, instances: usize, far: f32) -> f32 {
         let mesh = |triangles| Mesh {

@@ -58,9 +58,11 @@ const FIGURES: [(&str, &str); 6] = [
 fn once(args: &BenchArgs) -> Result<Vec<f64>, Failure> {
     let before = Memory::now();
     let clock = Clock::real();
-    let scene = Arc::new(input::scene(args.scene(), &args.choice(), &Limits::default())?);
+    let limits = Limits::default();
+    let scene = Arc::new(input::scene(args.scene(), &args.choice(), &limits)?);
     let read = clock.now().secs();
-    let world = Arc::new(World::new(Arc::clone(&scene)));
+    let world = World::open(args.scene(), Arc::clone(&scene), &limits);
+    let world = Arc::new(world.map_err(Failure::bad_input)?);
     let prepared = clock.now().secs();
     let after = Memory::now();
     let (view, tracing) = (ViewSource::Camera(0), frameless_trace::Settings::default());
