@@ -184,17 +184,22 @@ impl Sums {
             below[index] = Part { sum: all.sum + half_area(all.bounds), ..all }.kept();
             sums.whole = all.boxes();
             // A child far away is no reason to take the others apart.
-            let of_neighbours = parts
-                .iter()
-                .map(|part| together(parts.iter().filter(|other| part.is_where(other))));
-            for crowd in of_neighbours.chain([all]) {
-                let boxes = crowd.boxes();
-                if boxes > sums.most {
-                    (sums.most, sums.at) = (boxes, crowd.leaf);
+            for part in parts {
+                // Even with all of them in its own box.
+                if all.sum > (sums.most - 1.0) * half_area(part.bounds) {
+                    sums.add(&together(parts.iter().filter(|other| part.is_where(other))));
                 }
             }
+            sums.add(&all);
         }
         sums
+    }
+
+    fn add(&mut self, crowd: &Part) {
+        let boxes = crowd.boxes();
+        if boxes > self.most {
+            (self.most, self.at) = (boxes, crowd.leaf);
+        }
     }
 }
 
