@@ -54,7 +54,7 @@ impl Default for Limits {
             nodes: 1_000_000,
             node_depth: 200_000,
             instances: 500_000,
-            lights: 500,
+            lights: 300,
             overlap: 3_000,
             keyframes: 20_000_000,
             json_depth: 100,
