@@ -1,5 +1,6 @@
 //! From triangles to a wide BVH: of few at once, of many in parts (see [`crate::parts`]).
 
+use frameless::prefer_large_pages;
 use frameless_scene::{FARTHEST_M, Mesh};
 use glam::{Affine3A, Vec3, Vec3A};
 use obvhs::aabb::Aabb;
@@ -9,7 +10,6 @@ use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 
 use crate::collapse::{Collapse, bounds};
 use crate::leaf::{self, Corner, LONGEST, MOST_TRIANGLES, MOST_VERTICES};
-use crate::pages::prefer_large_pages;
 use crate::parts;
 use crate::sah;
 use crate::wide::{Child, Node};

@@ -34,7 +34,6 @@ mod moment;
 mod numbers;
 mod order;
 mod packet;
-mod pages;
 mod parts;
 mod patch;
 mod path;

@@ -1,5 +1,6 @@
 //! The samples kept: the newest of every pixel.
 
+use crate::pages::prefer_large_pages;
 use crate::traced::{Mark, TileMarks, Traced};
 use crate::wide;
 use crate::{Size, Time};
@@ -37,6 +38,7 @@ impl Canvas {
     /// If `rgb` (linear, row-major) does not have one colour per pixel.
     pub fn from_picture(size: Size, rgb: Vec<[f32; 3]>) -> Canvas {
         assert_eq!(rgb.len(), size.pixels(), "one colour per pixel");
+        prefer_large_pages(&rgb);
         Canvas {
             size,
             generation: 0,

@@ -37,6 +37,7 @@ mod clock;
 mod display;
 mod engine;
 mod lighting;
+mod pages;
 mod pose;
 mod rates;
 mod reconstruction;
@@ -86,4 +87,5 @@ pub use reconstruction::{
 };
 pub use tone_map::ToneMap;
 
+pub use pages::prefer_large_pages;
 pub use rng::Rng;

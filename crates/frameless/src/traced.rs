@@ -10,8 +10,7 @@
 
 use crate::tile::TileGrid;
 use crate::time::{TICK_BITS, TICK_SECS, Tick};
-use crate::wide;
-use crate::{Size, Time};
+use crate::{Size, Time, pages, wide};
 
 /// Pixels of a tile.
 pub(crate) const TILE_PIXELS: usize = 64;
@@ -110,7 +109,7 @@ impl Traced {
     }
 
     fn unmarked(grid: &TileGrid, mark: u32) -> Vec<TileMarks> {
-        vec![TileMarks([mark; TILE_PIXELS]); grid.len()]
+        pages::filled(TileMarks([mark; TILE_PIXELS]), grid.len())
     }
 
     pub(crate) fn grid(&self) -> &TileGrid {

@@ -1,5 +1,5 @@
-//! Loops over plain numbers, eight at a time, compiled for the vector unit of the processor at hand. The one place of this crate
-//! with `unsafe` code.
+//! Loops over plain numbers, eight at a time, compiled for the vector unit of the processor at hand. The one place of this
+//! crate with `unsafe` code, but for [`pages`](crate::pages).
 //!
 //! The results do not depend on it: every lane does the same IEEE operations, and nothing is contracted.
 #![allow(unsafe_code)]

@@ -10,6 +10,7 @@
 
 use super::packed::{PackedAlbedo, PackedLinear, PackedNormal};
 use super::touched::Touched;
+use crate::pages::filled;
 use crate::time::TICK_BITS;
 pub(super) use crate::time::{TICK_SECS, Tick};
 use crate::wide::{self, F8, M8, Unit};
@@ -393,10 +394,10 @@ impl Store {
     pub(super) fn new(size: Size, per_side: u32, is_shaded: bool) -> Store {
         let layout = Layout::new(size, per_side);
         Store {
-            object: vec![EMPTY; layout.len()],
-            record: vec![Record::default(); layout.len()],
-            surfel: vec![Surfel::default(); layout.len()],
-            shading: vec![Shading::default(); if is_shaded { layout.len() } else { 0 }],
+            object: filled(EMPTY, layout.len()),
+            record: filled(Record::default(), layout.len()),
+            surfel: filled(Surfel::default(), layout.len()),
+            shading: filled(Shading::default(), if is_shaded { layout.len() } else { 0 }),
             primitive: vec![UNKNOWN; layout.len()],
             touched: Touched::new(size),
             layout,

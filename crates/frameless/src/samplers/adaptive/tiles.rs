@@ -7,7 +7,7 @@ use super::front::TileFront;
 use super::why::{Reasons, Why};
 use crate::rates::Evidence;
 use crate::traced::Place;
-use crate::wide;
+use crate::{pages, wide};
 
 /// See the module.
 #[derive(Clone, Copy, Debug, Default)]
@@ -32,7 +32,7 @@ const LAST_AGE: f32 = 0.05;
 
 impl Tiles {
     pub(super) fn new(tiles: usize) -> Tiles {
-        Tiles(vec![Tile::default(); tiles])
+        Tiles(pages::filled(Tile::default(), tiles))
     }
 
     #[inline(always)]

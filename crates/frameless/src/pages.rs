@@ -1,12 +1,12 @@
-//! Large arrays on large pages: a ray that jumps about in a tree of a hundred megabytes else waits for the translation of addresses more
-//! often than for the memory itself.
+//! Large arrays on large pages: a ray that jumps about in a tree of a hundred megabytes, or a sampler in a picture of eight million pixels, else
+//! waits for the translation of addresses as often as for the memory itself.
 //!
 //! SAFETY, once for all: the advice names whole pages inside a slice that is borrowed for the time of the call. It changes neither what is
 //! in them nor who may use them; a system that does not know it, or has no large page left, says so and does nothing.
 #![allow(unsafe_code)]
 
 /// Asks the system to move what is in `items` to large pages, now. Does nothing for what is smaller than a few of them.
-pub(crate) fn prefer_large_pages<T>(items: &[T]) {
+pub fn prefer_large_pages<T>(items: &[T]) {
     #[cfg(target_os = "linux")]
     {
         const LARGE: usize = 2 << 20;
@@ -23,4 +23,11 @@ pub(crate) fn prefer_large_pages<T>(items: &[T]) {
     }
     #[cfg(not(target_os = "linux"))]
     let _ = items;
+}
+
+/// As `vec![item; len]`, on large pages if it is large.
+pub(crate) fn filled<T: Clone>(item: T, len: usize) -> Vec<T> {
+    let items = vec![item; len];
+    prefer_large_pages(&items);
+    items
 }
