@@ -1,6 +1,6 @@
 //! The samples kept: the newest of every pixel.
 
-use crate::pages::prefer_large_pages;
+use crate::pages::await_large_pages;
 use crate::traced::{Mark, TileMarks, Traced};
 use crate::wide;
 use crate::{Size, Time};
@@ -25,7 +25,9 @@ pub struct Canvas {
 impl Canvas {
     /// A black canvas on which no pixel has been traced yet (all times [`Time::ZERO`]).
     pub fn new(size: Size) -> Canvas {
-        let mut canvas = Canvas::from_picture(size, vec![[0.0; 3]; size.pixels()]);
+        let black = vec![[0.0; 3]; size.pixels()];
+        await_large_pages(&black);
+        let mut canvas = Canvas::from_picture(size, black);
         canvas.traced = Traced::new(size, false);
         canvas.holes = coarse_to_fine(size);
         canvas.updates = 1;
@@ -38,7 +40,6 @@ impl Canvas {
     /// If `rgb` (linear, row-major) does not have one colour per pixel.
     pub fn from_picture(size: Size, rgb: Vec<[f32; 3]>) -> Canvas {
         assert_eq!(rgb.len(), size.pixels(), "one colour per pixel");
-        prefer_large_pages(&rgb);
         Canvas {
             size,
             generation: 0,

@@ -14,7 +14,7 @@
 use super::AdaptiveStage;
 use super::block::BLOCK;
 use super::order::{self, Order};
-use super::shares::{Shares, Weigh};
+use super::shares::{Shares, Sums, Weigh};
 use super::tiles::{Tile, Tiles};
 use super::why::Why;
 use crate::rates::Rates;
@@ -98,8 +98,7 @@ impl Credit {
     }
 
     /// (a, b) of [`Shares::draw`] for a number of samples, of which `least_even` are spread evenly at the least.
-    fn scale(&self, count: f32, least_even: f32) -> (f32, f32) {
-        let sums = self.shares.sums();
+    fn scale(&self, sums: Sums, [count, least_even]: [f32; 2]) -> (f32, f32) {
         let is_even = self.evenly || sums.weight <= 0.0;
         let evenly = if is_even { 1.0 } else { EVENLY.max(least_even / count).min(1.0) };
         let per_weight = f64::from((1.0 - evenly) * count) / sums.weight.max(f64::MIN_POSITIVE);
@@ -108,22 +107,26 @@ impl Credit {
 
     /// The part of the samples that each tile gets, of those that holes and fronts leave.
     pub(crate) fn shares(&self, weights: &ByRate) -> Vec<f32> {
-        let (a, b) = self.scale(1.0, 0.0);
+        // Of the rates as they are now: sums are as they were when tiles were drawn last.
+        let sum = |numbers: Vec<f32>| numbers.into_iter().map(f64::from).sum();
+        let weight = sum(self.shares.all(1.0, 0.0, weights));
+        let even = sum(self.shares.all(0.0, 1.0, weights));
+        let (a, b) = self.scale(Sums { weight, even }, [1.0, 0.0]);
         self.shares.all(a, b, weights)
     }
 
-    /// Gives out about `count` samples, exactly on average; `least_even` of them are spread evenly, if they are as many.
+    /// Gives out about as many samples as the first of `counts`, exactly on average; the second of them are spread evenly, if they are as many.
     pub(crate) fn draw(
         &mut self,
         now: Time,
         canvas: &Canvas,
         weights: &ByRate,
         tiles: &mut Tiles,
-        [count, least_even]: [f32; 2],
+        counts: [f32; 2],
         requests: &mut Vec<Request>,
     ) {
         self.shares.renew(weights);
-        let (a, b) = self.scale(count, least_even);
+        let (a, b) = self.scale(self.shares.sums(), counts);
         self.drawn.clear();
         self.shares.draw(a, b, weights, &mut self.drawn);
         let Credit { order, drawn, .. } = self;

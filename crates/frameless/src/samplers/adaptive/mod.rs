@@ -455,6 +455,26 @@ mod tests {
     }
 
     #[test]
+    fn probabilities_sum_to_one_whatever_was_observed_since_the_last_draw() {
+        let size = Size::new(60, 44);
+        let mut canvas = Canvas::from_picture(size, vec![[0.0; 3]; size.pixels()]);
+        let mut sampler = Adaptive::new(DEFAULT_TEMPORAL, 5);
+        for turn in 1..20u64 {
+            let now = Time(turn * 1_000_000);
+            let chosen = choose(&mut sampler, &canvas, 200);
+            let observe = |pixel: u32| {
+                let (previous, _) = canvas.replace(pixel, now, [0.0; 3]);
+                let change = if pixel < 600 { 0.3 } else { 0.0 };
+                Observation { pixel, now, previous, known: true, change, refinement: None }
+            };
+            let observations: Vec<Observation> = chosen.into_iter().map(observe).collect();
+            sampler.observe(&canvas, &observations);
+            let sum: f32 = sampler.inspect(now, &canvas).probability.iter().sum();
+            assert!((sum - 1.0).abs() < 1e-4, "{sum} at turn {turn}");
+        }
+    }
+
+    #[test]
     fn a_new_picture_is_covered_evenly_from_coarse_to_fine() {
         let size = Size::new(64, 32);
         let canvas = Canvas::new(size);
