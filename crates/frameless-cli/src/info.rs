@@ -66,7 +66,7 @@ fn parts(what: &str, names: &[String], used: &str, which: &[usize]) -> Vec<Strin
     let which: HashSet<usize> = which.iter().copied().collect();
     let line = |(index, name): (usize, &String)| {
         let mark = if which.contains(&index) { format!(", {used}") } else { String::new() };
-        item(index, &format!("{name:?}{mark}"))
+        item(index, &format!("{}{mark}", quoted(name)))
     };
     lines.extend(names.iter().enumerate().map(line));
     lines
@@ -159,6 +159,15 @@ fn picture(image: &Image) -> String {
     format!("{}×{}, {:.2} MiB", image.width, image.height, image_bytes(image) as f64 / MIB)
 }
 
+/// A name from the file, in quotes, control characters escaped; of a long one the beginning.
+fn quoted(name: &str) -> String {
+    const MOST: usize = 100;
+    match name.char_indices().nth(MOST) {
+        None => format!("{name:?}"),
+        Some((end, _)) => format!("{:?}…", &name[..end]),
+    }
+}
+
 fn camera(camera: &Camera) -> String {
     let projection = match camera.projection {
         Projection::Perspective { yfov_rad } => {
@@ -168,7 +177,11 @@ fn camera(camera: &Camera) -> String {
             format!("orthographic, {} m from top to bottom", 2.0 * ymag)
         }
     };
-    if camera.name.is_empty() { projection } else { format!("{projection}, {:?}", camera.name) }
+    if camera.name.is_empty() {
+        projection
+    } else {
+        format!("{projection}, {}", quoted(&camera.name))
+    }
 }
 
 fn light(light: &Light) -> String {

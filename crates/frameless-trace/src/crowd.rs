@@ -77,7 +77,7 @@ impl World {
             0.0 => "boxes of surfaces on top of each other for a ray",
             _ => "boxes of surfaces on top of each other for a ray, as things move",
         };
-        let problem = Problem::Limit { what, came, limit };
+        let problem = Problem::Limit { what, came, limit, enough: None };
         Err(LoadError { file: file.to_owned(), place, problem })
     }
 

@@ -147,15 +147,16 @@ fn missing_bytes(picture: &[u8]) -> Option<String> {
 pub(super) fn working_bytes(picture: &[u8], [width, height]: [u32; 2], decoded_bytes: u64) -> u64 {
     const RGBA: u64 = 4;
     let pixels = u64::from(width) * u64::from(height);
+    let rgba = RGBA.saturating_mul(pixels);
     // As the decoder has it, then as we do.
-    let both = decoded_bytes.saturating_add(RGBA * pixels);
+    let both = decoded_bytes.saturating_add(rgba);
     match format_of(picture) {
         Some(ImageFormat::Jpeg) => match Frame::of(picture).filter(|frame| frame.is_kept) {
-            Some(frame) => (2 * frame.coefficients(pixels)).saturating_add(RGBA * pixels),
-            None => RGBA * pixels,
+            Some(frame) => frame.coefficients(pixels).saturating_mul(2).saturating_add(rgba),
+            None => rgba,
         },
         // Eight bits per channel are decoded to what we have.
-        Some(ImageFormat::Png) if decoded_bytes <= RGBA * pixels => RGBA * pixels,
+        Some(ImageFormat::Png) if decoded_bytes <= rgba => rgba,
         _ => both,
     }
 }

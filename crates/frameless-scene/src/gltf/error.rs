@@ -57,7 +57,7 @@ pub enum Problem {
         came: String,
     },
     /// More than [`crate::Limits`] allow.
-    #[error("{came} {what}, more than the limit of {limit}{}", how_to_raise(what))]
+    #[error("{came} {what}, more than the limit of {limit}{}", how_to_raise(what, *enough))]
     Limit {
         /// The thing that is counted.
         what: &'static str,
@@ -65,6 +65,8 @@ pub enum Problem {
         came: u64,
         /// How many are allowed.
         limit: u64,
+        /// Of which value of the field of [`crate::Limits`] that bounds it this would be allowed, if the limit is a part of that.
+        enough: Option<u64>,
     },
     /// The file says that it cannot be understood without this extension.
     #[error("the file requires the extension {0}, which is not supported")]
@@ -79,6 +81,14 @@ pub(super) struct Fault {
 }
 
 impl Fault {
+    /// The limit is a part of one that a flag raises: `enough` of that for so many.
+    pub(super) fn telling(mut self, of: impl FnOnce(u64) -> u64) -> Fault {
+        if let Problem::Limit { came, enough, .. } = &mut self.problem {
+            *enough = Some(of(*came));
+        }
+        self
+    }
+
     pub(super) fn at_byte(offset: usize, wanted: &str, came: impl fmt::Display) -> Fault {
         Fault { place: Place::Byte(offset as u64), problem: unexpected(wanted, came) }
     }
@@ -93,8 +103,16 @@ impl Fault {
 }
 
 /// Names the flag of the program `frameless` that raises the limit, if there is one.
-fn how_to_raise(what: &str) -> String {
-    flag_of(what).map_or(String::new(), |flag| format!("; {flag} raises it"))
+fn how_to_raise(what: &str, enough: Option<u64>) -> String {
+    const MIB: u64 = 1 << 20;
+    let Some(flag) = flag_of(what) else { return String::new() };
+    match enough {
+        None => format!("; {flag} raises it"),
+        Some(bytes) if flag == "--max-memory" => {
+            format!("; {flag} raises it ({}M or more)", bytes.div_ceil(MIB))
+        }
+        Some(count) => format!("; {flag} raises it ({count} or more)"),
+    }
 }
 
 fn unexpected(wanted: impl fmt::Display, came: impl fmt::Display) -> Problem {

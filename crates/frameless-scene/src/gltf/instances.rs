@@ -220,8 +220,8 @@ fn pose_bytes(mesh: &Mesh, skin: Option<&Skin>) -> usize {
 
 /// Where it is and its normal, now and before.
 const BYTES_PER_POSED_VERTEX: usize = 48;
-/// What is made of it for rays.
-const BYTES_PER_POSED_TRIANGLE: usize = 36;
+/// What is made of it for rays, and as much again while it is made.
+const BYTES_PER_POSED_TRIANGLE: usize = 72;
 
 /// Where EXT_mesh_gpu_instancing wants the mesh, in the node's coordinates.
 fn read_places(

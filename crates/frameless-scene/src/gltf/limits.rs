@@ -123,22 +123,20 @@ impl Budget {
     ) -> Result<(), Fault> {
         let bytes = (count as u64).saturating_mul(each as u64);
         let limit = self.limits.decoded_bytes.saturating_sub(self.image_bytes);
-        within(self.bytes.saturating_add(bytes), limit, "decoded bytes", pointer)?;
-        let (limit, what) = (self.made_limit(), "bytes made of few bytes of file");
-        spend(&mut self.bytes, bytes, limit, what, pointer)
+        within(self.bytes.saturating_add(bytes), limit, "decoded bytes", pointer)
+            .map_err(|fault| fault.telling(|came| came.saturating_add(self.image_bytes)))?;
+        let ([of_nothing, of_files], what) = (self.made(), "bytes made of few bytes of file");
+        spend(&mut self.bytes, bytes, of_nothing.saturating_add(of_files), what, pointer)
+            .map_err(|fault| fault.telling(|came| (came - of_files).saturating_mul(MADE_SHARE)))
     }
 
-    /// What may be made of files of this size.
-    fn made_limit(&self) -> u64 {
-        /// Of what may be decoded; by default 256 MiB, or two million triangles, which take a second on two cores. Files that show a sphere in
-        /// a hundred materials have half of it.
-        const SHARE: u64 = 16;
+    /// What may be made of nothing, and beyond that of files of this size.
+    fn made(&self) -> [u64; 2] {
         /// What is compressed best (EXT_meshopt_compression, quantised to 8 bits) is made into about 20 times as much.
         const PER_BYTE: u64 = 32;
-        let of_nothing = self.limits.decoded_bytes / SHARE;
         // Whoever wants less than usual of all does not want less of small files.
-        let of_nothing = of_nothing.max(Limits::default().decoded_bytes / SHARE);
-        of_nothing.saturating_add(PER_BYTE.saturating_mul(self.file_bytes))
+        let most = self.limits.decoded_bytes.max(Limits::default().decoded_bytes);
+        [most / MADE_SHARE, PER_BYTE.saturating_mul(self.file_bytes)]
     }
 
     /// The same of an accessor without data, whose elements are zeros until a sparse one replaces some: morph targets that move little.
@@ -152,7 +150,8 @@ impl Budget {
         const VOID_SHARE: u64 = 128;
         let bytes = (count as u64).saturating_mul(each as u64);
         let limit = self.limits.decoded_bytes / VOID_SHARE;
-        spend(&mut self.void_bytes, bytes, limit, "bytes of zeros without data", pointer)?;
+        spend(&mut self.void_bytes, bytes, limit, "bytes of zeros without data", pointer)
+            .map_err(|fault| fault.telling(|came| came.saturating_mul(VOID_SHARE)))?;
         self.allocate(pointer, count, each)
     }
 
@@ -177,8 +176,10 @@ impl Budget {
         /// A place is three numbers of four bytes, or of two, compressed.
         const BYTES_PER_INSTANCE: u64 = 8;
         within(count as u64, self.limits.instances, "instances", pointer)?;
-        let limit = self.limits.instances / SHARE + self.file_bytes / BYTES_PER_INSTANCE;
+        let of_files = self.file_bytes / BYTES_PER_INSTANCE;
+        let limit = self.limits.instances / SHARE + of_files;
         spend(&mut self.placed, count as u64, limit, "instances from few bytes of file", pointer)
+            .map_err(|fault| fault.telling(|came| (came - of_files).saturating_mul(SHARE)))
     }
 
     /// The `bytes` of a picture are about to be looked through: several pictures may be of the same.
@@ -187,10 +188,11 @@ impl Budget {
         const SHARE: u64 = 64;
         /// How often each byte of the files may be looked at besides.
         const TIMES: u64 = 4;
-        let limit = self.limits.decoded_bytes / SHARE;
-        let limit = limit.saturating_add(TIMES.saturating_mul(self.file_bytes));
+        let of_files = TIMES.saturating_mul(self.file_bytes);
+        let limit = (self.limits.decoded_bytes / SHARE).saturating_add(of_files);
         let what = "bytes of pictures that share them";
         spend(&mut self.looked_through, bytes as u64, limit, what, pointer)
+            .map_err(|fault| fault.telling(|came| (came - of_files).saturating_mul(SHARE)))
     }
 
     /// A picture is about to be decoded.
@@ -218,13 +220,19 @@ impl Budget {
             .max(working_bytes / BYTES_PER_PIXEL)
             .saturating_sub(PIXELS_PER_BYTE.saturating_mul(told));
         let thin_limit = self.limits.total_pixels / THIN_SHARE;
-        spend(&mut self.thin_pixels, thin, thin_limit, "pixels in images of few bytes", pointer)?;
+        spend(&mut self.thin_pixels, thin, thin_limit, "pixels in images of few bytes", pointer)
+            .map_err(|fault| fault.telling(|came| came.saturating_mul(THIN_SHARE)))?;
         spend(&mut self.pixels, pixels, self.limits.total_pixels, "pixels in all images", pointer)?;
         let limit = self.limits.decoded_bytes.saturating_sub(self.bytes);
         let bytes = image_bytes(pixels).max(working_bytes);
         spend(&mut self.image_bytes, bytes, limit, "decoded bytes", pointer)
+            .map_err(|fault| fault.telling(|came| came.saturating_add(self.bytes)))
     }
 }
+
+/// Of what may be decoded, the part that may be made of nothing; by default 256 MiB, or two million triangles, which take a second on two cores. Files
+/// that show a sphere in a hundred materials have half of it.
+const MADE_SHARE: u64 = 16;
 
 /// How large a picture is.
 #[derive(Clone, Copy, Debug, Default)]
@@ -262,7 +270,10 @@ pub(crate) fn check_environment_size(
     let thin = pixels.saturating_sub(PIXELS_PER_BYTE.saturating_mul(encoded_bytes as u64));
     let thin_limit = limits.total_pixels / THIN_SHARE;
     within(pixels, limits.image_pixels, "pixels in one image", "")
-        .and_then(|()| within(thin, thin_limit, "pixels in images of few bytes", ""))
+        .and_then(|()| {
+            within(thin, thin_limit, "pixels in images of few bytes", "")
+                .map_err(|fault| fault.telling(|came| came.saturating_mul(THIN_SHARE)))
+        })
         .and_then(|()| within(bytes, limits.decoded_bytes, "decoded bytes", ""))
         .map_err(|fault| fault.problem)
 }
@@ -317,7 +328,7 @@ pub(super) fn within(
         return Ok(());
     }
     let place = Place::Pointer(pointer.to_owned());
-    Err(Fault { place, problem: Problem::Limit { what, came, limit } })
+    Err(Fault { place, problem: Problem::Limit { what, came, limit, enough: None } })
 }
 
 #[cfg(test)]
@@ -337,7 +348,7 @@ mod tests {
         let mut budget = Budget::new(&Limits::default());
         assert!(budget.allocate("/a", 1 << 28, 1).is_ok());
         let refusal = budget.allocate("/a", 320, 1).unwrap_err().in_file("f").to_string();
-        assert!(refusal.contains("--max-memory"), "{refusal}");
+        assert!(refusal.contains("--max-memory raises it (4097M or more)"), "{refusal}");
         budget.add_file(Path::new(""), 10);
         budget.add_file(Path::new(""), 1 << 40);
         assert!(budget.allocate("/a", 320, 1).is_ok());
@@ -380,7 +391,11 @@ mod tests {
         for _ in 0..4 {
             assert!(add(20_000).is_ok());
         }
-        assert!(add(20_000).is_err());
+        let refusal = add(20_000).unwrap_err().in_file("f").to_string();
+        assert!(
+            refusal.contains("--max-texture-pixels raises it (619888640 or more)"),
+            "{refusal}"
+        );
         // Whoever has data for it may have more.
         assert!(add(1 << 20).is_ok());
         // But not the same data again.
