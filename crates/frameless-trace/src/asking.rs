@@ -23,7 +23,15 @@ pub(crate) struct Asked {
     pub(crate) unhindered: Vec3A,
     /// Which these are, see [`frameless::Surface::lit`]; the first 32.
     pub(crate) lit: u32,
+    /// What `all` were if nothing stood anywhere.
+    offered: Vec3A,
+    /// What [`World::ask_lights`] had to do: for each ray one, and one for each hole that it passes.
+    pub(crate) effort: u32,
 }
+
+/// The effort of a ray to a light of which nothing arrives: how many holes it was asked about before that was known depends on the order in
+/// which they were met.
+const BLOCKED: u32 = 4;
 
 /// Light that reaches a point.
 #[derive(Clone, Copy, Debug)]
@@ -73,12 +81,25 @@ fn reach(light: &Light) -> f32 {
 
 impl Asked {
     /// Before any light is asked.
-    pub(crate) const NOBODY: Asked =
-        Asked { all: Vec3A::ZERO, unhindered: Vec3A::ZERO, lit: u32::MAX };
+    pub(crate) const NOBODY: Asked = Asked {
+        all: Vec3A::ZERO,
+        unhindered: Vec3A::ZERO,
+        lit: u32::MAX,
+        offered: Vec3A::ZERO,
+        effort: 0,
+    };
+
+    /// Which part of the light arrives, of all lights together; `unknown` where there is none.
+    #[inline(always)]
+    pub(crate) fn share(&self, unknown: Vec3A) -> Vec3A {
+        let share = (self.all / self.offered).min(Vec3A::ONE);
+        Vec3A::select(self.offered.cmpgt(Vec3A::ZERO), share, unknown)
+    }
 
     /// A light's answer, of which this part passes; returns what arrives, if anything does.
     #[inline(always)]
     fn add(&mut self, index: usize, arriving: Arriving, passes: Vec3A) -> Option<Arriving> {
+        self.offered += arriving.per_albedo();
         let arriving = Arriving { irradiance: passes * arriving.irradiance, ..arriving };
         let arrives = passes != Vec3A::ZERO;
         if arrives {
@@ -112,7 +133,9 @@ impl World {
                 continue;
             };
             let shadow_ray = arriving.shadow_ray(point, light);
-            let passes = self.passing(moment, &shadow_ray, reach(light), true, stack);
+            let way = (&shadow_ray, reach(light));
+            let (passes, holes) = self.passing_counted(moment, way, true, stack);
+            asked.effort += if passes == Vec3A::ZERO { BLOCKED } else { 1 + holes };
             let arrived = asked.add(index, arriving, passes);
             probe.note(|| {
                 let (cos, contribution) = (arriving.cos, arrived.map_or(Vec3A::ZERO, |a| a.per_albedo()));
@@ -120,6 +143,23 @@ impl World {
             });
             if let Some(arrived) = arrived {
                 take(arrived);
+            }
+        }
+        asked
+    }
+
+    /// What [`World::ask_lights`] may say if this part of the light arrives: no ray is sent.
+    #[inline(never)]
+    pub(crate) fn assume_lights(
+        moment: &Moment,
+        point: &Point,
+        settings: &Settings,
+        share: Vec3A,
+    ) -> Asked {
+        let mut asked = Asked::NOBODY;
+        for (index, light) in moment.lights.iter().enumerate() {
+            if let Some(arriving) = Arriving::at(point, light, settings) {
+                asked.add(index, arriving, share);
             }
         }
         asked

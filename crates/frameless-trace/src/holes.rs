@@ -135,7 +135,19 @@ impl World {
         through_glass: bool,
         stack: &mut Stack,
     ) -> Vec3A {
-        self.passing_targets(moment, &moment.targets(self), (ray, t_max), through_glass, stack)
+        self.passing_counted(moment, (ray, t_max), through_glass, stack).0
+    }
+
+    /// The same, and how many holes it passes if any of it does: in whichever order they are met, that is the same number.
+    #[inline(always)]
+    pub(crate) fn passing_counted(
+        &self,
+        moment: &Moment,
+        way: (&Ray, f32),
+        through_glass: bool,
+        stack: &mut Stack,
+    ) -> (Vec3A, u32) {
+        self.passing_targets(moment, &moment.targets(self), way, through_glass, stack)
     }
 
     /// What [`World::passing`] says of each of at most [`SHADED`] rays, through glass.
@@ -159,8 +171,8 @@ impl World {
             }
             *passes = match has(passed) {
                 true if has(is_all) => Vec3A::ONE,
-                true => self.passing_targets(moment, &rest, (ray, t_max), true, stack),
-                false => self.passing_targets(moment, &all, (ray, t_max), true, stack),
+                true => self.passing_targets(moment, &rest, (ray, t_max), true, stack).0,
+                false => self.passing_targets(moment, &all, (ray, t_max), true, stack).0,
             };
         }
         passes
@@ -174,12 +186,12 @@ impl World {
         (ray, t_max): (&Ray, f32),
         through_glass: bool,
         stack: &mut Stack,
-    ) -> Vec3A {
+    ) -> (Vec3A, u32) {
         if self.has_holes {
             return self.passing_holes(moment, targets, (ray, t_max), through_glass, stack);
         }
         let is_shaded = targets.occluded(ray, t_max, stack);
-        if is_shaded { Vec3A::ZERO } else { Vec3A::ONE }
+        (if is_shaded { Vec3A::ZERO } else { Vec3A::ONE }, 0)
     }
 
     #[inline(never)]
@@ -190,22 +202,23 @@ impl World {
         (ray, t_max): (&Ray, f32),
         through_glass: bool,
         stack: &mut Stack,
-    ) -> Vec3A {
+    ) -> (Vec3A, u32) {
         let (lights, [least, most]) = (moment.lights.len() as u32, ASKED_OF_LIGHT);
+        let may_ask = (MOST_ASKED_OF_LIGHTS / lights.max(1)).clamp(least, most);
         let mut shade = Shade {
             world: self,
             moment,
             ray,
             through_glass,
-            left: (MOST_ASKED_OF_LIGHTS / lights.max(1)).clamp(least, most),
+            left: may_ask,
             passes: Vec3A::ONE,
             depth: Vec3A::ZERO,
             inside: Vec3A::ZERO,
         };
         if targets.occluded_through(ray, t_max, &mut shade, stack) {
-            return Vec3A::ZERO;
+            return (Vec3A::ZERO, 0);
         }
-        shade.result(t_max)
+        (shade.result(t_max), may_ask - shade.left)
     }
 }
 
