@@ -6,7 +6,7 @@ use crate::algorithm::Algorithm;
 
 /// Increased whenever a built-in scene, a tracer, the clock, a metric or the way pictures are made gives other results for the same
 /// input: no run from before is used again.
-pub(super) const WORLD_VERSION: u32 = 9;
+pub(super) const WORLD_VERSION: u32 = 10;
 
 /// Whoever shares code that is no other's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
