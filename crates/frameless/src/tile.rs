@@ -158,6 +158,12 @@ pub(crate) struct PerTile(Vec<Line>);
 #[repr(align(64))]
 struct Line([f32; LINE]);
 
+/// A line's two halves.
+#[inline(always)]
+pub(crate) fn halves<U: Unit>(line: &[f32; LINE]) -> [F8<U>; 2] {
+    [F8::load(line, 0), F8::load(line, LINE / 2)]
+}
+
 impl PerTile {
     /// All 0.
     pub(crate) fn new(tiles: usize) -> PerTile {
@@ -191,8 +197,7 @@ impl PerTile {
     /// A line's two halves.
     #[inline(always)]
     pub(crate) fn halves<U: Unit>(&self, line: usize) -> [F8<U>; 2] {
-        let line = self.line(line);
-        [F8::load(line, 0), F8::load(line, LINE / 2)]
+        halves(self.line(line))
     }
 
     /// Begins to fetch a line.

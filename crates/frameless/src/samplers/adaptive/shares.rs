@@ -13,7 +13,7 @@
 
 use super::block::{BLOCK, Due, push_bits, sum};
 use crate::Rng;
-use crate::tile::PerTile;
+use crate::tile::{PerTile, halves};
 use crate::wide::{self, F8, Task, Unit};
 
 /// How many blocks are swept over at a time: one for each bit of a mask.
@@ -126,8 +126,9 @@ impl Shares {
     /// w of a block's tiles.
     #[inline(always)]
     fn weights_of<U: Unit>(&self, block: usize, weights: &impl Weigh) -> [F8<U>; 2] {
-        let (there, [left, right]) = (self.there(block), weights.halves(block));
-        [left * F8::load(there, 0), right * F8::load(there, BLOCK / 2)]
+        let ([there_left, there_right], [left, right]) =
+            (halves(self.there(block)), weights.halves(block));
+        [left * there_left, right * there_right]
     }
 
     /// Over all tiles.
@@ -217,11 +218,6 @@ impl Shares {
     pub(super) fn draw(&mut self, a: f32, b: f32, weights: &impl Weigh, tiles: &mut Vec<u32>) {
         wide::run(Draw { shares: self, a, b, weights, tiles });
     }
-}
-
-#[inline(always)]
-fn halves<U: Unit>(line: &[f32; BLOCK]) -> [F8<U>; 2] {
-    [F8::load(line, 0), F8::load(line, BLOCK / 2)]
 }
 
 /// See [`Shares::draw`].
