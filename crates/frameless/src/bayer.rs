@@ -3,11 +3,12 @@
 
 /// Place of pixel (x, y) in the order of a square of side 2^`bits`, repeated over the plane: the interleaved bits of x ⊕ y and
 /// y, the lowest bit first.
-pub(crate) fn rank(x: u32, y: u32, bits: u32) -> u32 {
-    let mut rank = 0;
-    for i in 0..bits {
+pub(crate) const fn rank(x: u32, y: u32, bits: u32) -> u32 {
+    let (mut rank, mut i) = (0, 0);
+    while i < bits {
         let (x, y) = ((x >> i) & 1, (y >> i) & 1);
         rank |= (((x ^ y) << 1) | y) << (2 * (bits - 1 - i));
+        i += 1;
     }
     rank
 }

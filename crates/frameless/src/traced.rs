@@ -61,14 +61,6 @@ impl Mark {
     pub(crate) fn since(self, earlier: Mark) -> i32 {
         self.0.wrapping_sub(earlier.0) as i32
     }
-
-    /// How old a pixel with this mark is, in half ticks: at least 0; the most that there is where nothing is known.
-    #[inline(always)]
-    pub(crate) fn age(self, now: Mark) -> i32 {
-        // Without a branch, since nobody can guess it.
-        let unknown = -((self.0 & 1) as i32) as u32 >> 1;
-        now.since(self).max(0) | unknown as i32
-    }
 }
 
 pub(crate) const HALF_TICKS_PER_SEC: f32 = 2.0 / TICK_SECS;

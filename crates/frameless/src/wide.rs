@@ -18,12 +18,8 @@ pub(crate) trait Task {
 /// Runs `task`, with AVX2 where the processor has it, and with the registers and masks of AVX-512 where it has these.
 pub(crate) fn run(task: impl Task) {
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx512vl")
-        && is_x86_feature_detected!("avx512bw")
-        && is_x86_feature_detected!("avx512dq")
-        && is_x86_feature_detected!("avx2")
-    {
-        #[target_feature(enable = "avx2,avx512f,avx512vl,avx512bw,avx512dq")]
+    if has_avx2() && has_avx512() {
+        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512vl,avx512bw,avx512dq")]
         fn run_avx512(task: impl Task) {
             task.run::<avx2::Avx2>()
         }
@@ -31,8 +27,8 @@ pub(crate) fn run(task: impl Task) {
         return unsafe { run_avx512(task) };
     }
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") {
-        #[target_feature(enable = "avx2")]
+    if has_avx2() {
+        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
         fn run_avx2(task: impl Task) {
             task.run::<avx2::Avx2>()
         }
@@ -40,6 +36,24 @@ pub(crate) fn run(task: impl Task) {
         return unsafe { run_avx2(task) };
     }
     task.run::<portable::Portable>()
+}
+
+/// AVX2, and what counts and shifts bits, as every processor with AVX2 has it.
+#[cfg(target_arch = "x86_64")]
+fn has_avx2() -> bool {
+    is_x86_feature_detected!("avx2")
+        && is_x86_feature_detected!("bmi1")
+        && is_x86_feature_detected!("bmi2")
+        && is_x86_feature_detected!("lzcnt")
+        && is_x86_feature_detected!("popcnt")
+}
+
+#[cfg(target_arch = "x86_64")]
+fn has_avx512() -> bool {
+    is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512vl")
+        && is_x86_feature_detected!("avx512bw")
+        && is_x86_feature_detected!("avx512dq")
 }
 
 /// What a vector unit does with eight numbers, `F`, or eight whole numbers or masks, `M`; see [`F8`] and [`M8`].

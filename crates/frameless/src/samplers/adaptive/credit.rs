@@ -13,23 +13,23 @@
 
 use super::AdaptiveStage;
 use super::block::BLOCK;
-use super::order::{self, Order};
+use super::order::Order;
 use super::shares::{Shares, Sums, Weigh};
 use super::tiles::{Tile, Tiles};
 use super::why::Why;
 use crate::rates::Rates;
 use crate::tile::TileGrid;
-use crate::traced::{Mark, Place, TILE_PIXELS, TileMarks};
+use crate::traced::{Place, TILE_PIXELS};
 use crate::wide::{self, F8, Task, Unit};
-use crate::{Canvas, Request, Rng, Time};
+use crate::{Request, Rng};
 
 /// ε: the part of the samples that is spread evenly over the picture, so that every pixel has a floor frequency.
 const EVENLY: f32 = 0.2;
 /// Added to v: so that a picture at rest is refined evenly.
 const LEAST_RATE: f32 = 1e-7;
 
-/// Of how many tiles the marks are fetched at once.
-const FEW: usize = 64;
+/// How many tiles ahead of the one at hand the next is fetched.
+const AHEAD: usize = 48;
 
 /// Whose turn it is, among the tiles and in each of them.
 pub(crate) struct Credit {
@@ -118,8 +118,6 @@ impl Credit {
     /// Gives out about as many samples as the first of `counts`, exactly on average; the second of them are spread evenly, if they are as many.
     pub(crate) fn draw(
         &mut self,
-        now: Time,
-        canvas: &Canvas,
         weights: &ByRate,
         tiles: &mut Tiles,
         counts: [f32; 2],
@@ -130,8 +128,7 @@ impl Credit {
         self.drawn.clear();
         self.shares.draw(a, b, weights, &mut self.drawn);
         let Credit { order, drawn, .. } = self;
-        let (marks, now) = (canvas.traced().tiles(), Mark::at(now));
-        wide::run(Look { order, drawn, marks, now, grid: &weights.rates.grid, tiles, requests });
+        wide::run(Look { order, drawn, grid: &weights.rates.grid, tiles, requests });
     }
 }
 
@@ -139,8 +136,6 @@ impl Credit {
 struct Look<'a> {
     order: &'a mut Order,
     drawn: &'a [u32],
-    marks: &'a [TileMarks],
-    now: Mark,
     grid: &'a TileGrid,
     tiles: &'a mut Tiles,
     requests: &'a mut Vec<Request>,
@@ -149,23 +144,20 @@ struct Look<'a> {
 impl Task for Look<'_> {
     #[inline(always)]
     fn run<U: Unit>(self) {
-        let Look { order, drawn, marks, now, grid, tiles, requests } = self;
-        // What is looked at lies all over the picture: it is fetched before, tile by tile and then a few tiles' marks.
-        drawn.iter().for_each(|&tile| tiles.prefetch(tile as usize));
-        for few in drawn.chunks(FEW) {
-            for &tile in few {
-                let (tile, turn) = (tile as usize, tiles.of(tile as usize).turn);
-                wide::prefetch(marks[tile].0.as_slice(), order.peek(turn));
+        let Look { order, drawn, grid, tiles, requests } = self;
+        // What is looked at lies all over the picture: it is fetched before.
+        let first = &drawn[..drawn.len().min(AHEAD)];
+        first.iter().for_each(|&tile| tiles.prefetch(tile as usize));
+        for (i, &tile) in drawn.iter().enumerate() {
+            if let Some(&later) = drawn.get(i + AHEAD) {
+                tiles.prefetch(later as usize);
             }
-            for &tile in few {
-                let tile = tile as usize;
-                let (pixels, marks) = (grid.pixels_of(tile), &marks[tile]);
-                let Tile { turn, reasons, mean_age_secs, .. } = tiles.of_mut(tile);
-                let enough = order::enough(*mean_age_secs);
-                let within = order.old_enough(now, marks, pixels, turn, enough);
-                reasons.set(1 << within, Why::Tile);
-                requests.push(Request::centre(grid.pixel(Place(TILE_PIXELS * tile + within))));
-            }
+            let tile = tile as usize;
+            let pixels = grid.pixels_of(tile);
+            let Tile { turn, reasons, recent, .. } = tiles.of_mut(tile);
+            let within = order.next_but_recent(pixels, recent, turn);
+            reasons.set(1 << within, Why::Tile);
+            requests.push(Request::centre(grid.pixel(Place(TILE_PIXELS * tile + within))));
         }
     }
 }

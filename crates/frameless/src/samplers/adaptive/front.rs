@@ -64,8 +64,6 @@ pub(super) struct TileFront {
     beside: u64,
     /// Those to be looked at again however young they are.
     suspect: u64,
-    /// Whether the tile is in the queue.
-    waits: bool,
 }
 
 impl TileFront {
@@ -174,18 +172,18 @@ impl Front {
     }
 
     #[inline(always)]
-    fn wait(&mut self, tile: usize, front: &mut TileFront) {
-        if !front.waits {
-            front.waits = true;
-            self.waiting.push_back(tile as u32);
+    fn wait(&mut self, number: usize, tile: &mut Tile) {
+        if !tile.waits {
+            tile.waits = true;
+            self.waiting.push_back(number as u32);
         }
     }
 
     /// A pixel that had better be looked at again.
     pub(crate) fn suspect(&mut self, tiles: &mut Tiles, place: Place) {
-        let front = &mut tiles.of_mut(place.tile()).front;
-        front.suspect |= 1 << place.within();
-        self.wait(place.tile(), front);
+        let tile = tiles.of_mut(place.tile());
+        tile.front.suspect |= 1 << place.within();
+        self.wait(place.tile(), tile);
     }
 
     /// Of how many seconds neighbours are left alone now.
@@ -207,7 +205,7 @@ impl Front {
                 tiles.prefetch(later as usize);
             }
             let tile = tile as usize;
-            let Tile { front, reasons, .. } = tiles.of_mut(tile);
+            let Tile { front, reasons, waits, .. } = tiles.of_mut(tile);
             let pixels = (front.beside | front.suspect) & grid.pixels_of(tile);
             let [taken, left] = if pixels == 0 { [0; 2] } else { take(tile, pixels) };
             reasons.set(taken, Why::Front);
@@ -217,6 +215,7 @@ impl Front {
                 return false;
             }
             *front = TileFront::default();
+            *waits = false;
             self.waiting.pop_front();
         }
         true
@@ -224,7 +223,8 @@ impl Front {
 
     pub(crate) fn clear(&mut self, tiles: &mut Tiles) {
         for tile in self.waiting.drain(..) {
-            tiles.of_mut(tile as usize).front = TileFront::default();
+            let Tile { front, waits, .. } = tiles.of_mut(tile as usize);
+            (*front, *waits) = (TileFront::default(), false);
         }
     }
 }
@@ -293,12 +293,12 @@ impl Task for LookAtNear<'_> {
                 young |= u64::from(since.signs()) << (8 * row);
             }
             let stale = pixels & !(young << (8 * first));
-            let front = &mut tiles.of_mut(tile as usize).front;
+            let Tile { front, waits, .. } = tiles.of_mut(tile as usize);
             front.beside |= stale;
             // Neither is it guessed who begins to wait.
             begin_to_wait[*count] = tile;
-            *count += usize::from((stale != 0) & !front.waits);
-            front.waits |= stale != 0;
+            *count += usize::from((stale != 0) & !*waits);
+            *waits |= stale != 0;
         }
     }
 }

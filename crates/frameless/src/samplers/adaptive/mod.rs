@@ -265,6 +265,7 @@ impl State {
         let number = place.tile();
         let tile = self.tiles.of_mut(number);
         tile.front.traced(place.within());
+        tile.recent.traced(place.within());
         if !observed.known {
             return;
         }
@@ -352,7 +353,7 @@ impl Sampler for Adaptive {
         let rest = count as f32 - (before - start) as f32;
         let counts = [rest + *owed, LEAST_EVEN * left];
         let weights = ByRate { rates, m: weights.of_tiles() };
-        credit.draw(now, canvas, &weights, tiles, counts, requests);
+        credit.draw(&weights, tiles, counts, requests);
         *owed += rest - (requests.len() - before) as f32;
     }
 

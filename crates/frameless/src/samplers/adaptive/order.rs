@@ -1,16 +1,16 @@
-//! Which pixel of a tile is next: Bayer's order (1973), but those that are young for their tile are passed over.
+//! Which pixel of a tile is next: Bayer's order (1973), but those that were traced lately are passed over.
 //!
 //! ```text
-//! next = the first of four in the order with age > ā / 2, else the oldest of the four
-//! ā ← ā + 0.05 (age − ā)                         for every sample of the tile that replaces one of that age
+//! next = the first in the order, from the tile's turn on, that was not traced since the turn came into the part before the present one;
+//!        the very next if there is none.  The order has four parts of 16 pixels.
 //! ```
+//!
+//! So what fronts and holes have traced waits for between a quarter and half of a round. All that has to be looked up for that are two bits per
+//! pixel, beside what else is known of the tile: when each was traced lies in lines of the cache of their own.
 
-use crate::traced::{HALF_TICKS_PER_SEC, Mark, TILE_PIXELS, TileMarks};
+use crate::traced::TILE_PIXELS;
 use crate::{Rng, bayer};
 use std::hint::select_unpredictable;
-
-/// Pixels looked at before one is taken that is younger than half the mean age of its tile.
-const TRIES: u32 = 4;
 
 /// See the module. A tile's turn is kept by whoever asks for its pixels.
 pub(crate) struct Order {
@@ -74,48 +74,62 @@ impl Order {
         }
     }
 
-    /// The next pixel of a tile that is more than `enough` old, of [`TRIES`]; else the oldest of these. Ages are in half ticks.
+    /// The next pixel of a tile that is not [`Recent`]; the next one where all are, and in tiles that are cut.
     #[inline(always)]
-    pub(crate) fn old_enough(
+    pub(crate) fn next_but_recent(
         &mut self,
-        now: Mark,
-        TileMarks(marks): &TileMarks,
         pixels: u64,
+        recent: &mut Recent,
         turn: &mut u8,
-        enough: f32,
     ) -> usize {
-        let mut oldest = self.next(pixels, turn);
-        let mut oldest_age = Mark(marks[oldest]).age(now);
-        if oldest_age as f32 > enough {
-            return oldest;
+        if pixels != u64::MAX || self.random.is_some() {
+            return self.next(pixels, turn);
         }
-        // Three of four times that is all; how many more are looked at nobody can guess, hence all are.
-        let mut next_turn = *turn;
-        for _ in 1..TRIES {
-            let is_enough = oldest_age as f32 > enough;
-            let within = self.next(pixels, &mut next_turn);
-            *turn = select_unpredictable(is_enough, *turn, next_turn);
-            let age = Mark(marks[within]).age(now);
-            let is_older = !is_enough & (age > oldest_age);
-            oldest = select_unpredictable(is_older, within, oldest);
-            oldest_age = select_unpredictable(is_older, age, oldest_age);
-        }
-        oldest
+        let others = !(recent.now | recent.before);
+        let others = select_unpredictable(others == 0, u64::MAX, others);
+        let rank = u32::from(*turn) + others.rotate_right(u32::from(*turn)).trailing_zeros();
+        let next = (rank as u8).wrapping_add(1);
+        let passes = (*turn ^ next) & PART != 0;
+        recent.before = select_unpredictable(passes, recent.now, recent.before);
+        recent.now = select_unpredictable(passes, 0, recent.now);
+        *turn = next;
+        self.peek(rank as u8)
     }
 }
 
-/// The age from which on pixels of a tile are old enough, in half ticks: half their mean age.
-#[inline(always)]
-pub(super) fn enough(mean_age_secs: f32) -> f32 {
-    // Not as a whole number: to be made one it would have to be asked whether it is one.
-    0.5 * HALF_TICKS_PER_SEC * mean_age_secs
+/// Which pixels of a tile were traced since its turn came to the last part but one of the order, a bit for the rank of each.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Recent {
+    now: u64,
+    before: u64,
 }
+
+/// Which parts of the order turns are in: sixteen pixels each.
+const PART: u8 = 0b11_0000;
+
+impl Recent {
+    #[inline(always)]
+    pub(super) fn traced(&mut self, within: usize) {
+        self.now |= 1 << RANKS[within];
+    }
+}
+
+/// Where in the order each pixel of a tile is.
+const RANKS: [u8; TILE_PIXELS] = {
+    let mut ranks = [0; TILE_PIXELS];
+    let mut within = 0;
+    while within < TILE_PIXELS {
+        ranks[within] = bayer::rank(within as u32 % 8, within as u32 / 8, 3) as u8;
+        within += 1;
+    }
+    ranks
+};
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Size;
     use crate::tile::TileGrid;
-    use crate::{Size, Time};
 
     #[test]
     fn every_pixel_of_a_cut_tile_has_its_turn() {
@@ -134,22 +148,65 @@ mod tests {
         }
     }
 
-    #[test]
-    fn the_young_are_passed_over_for_a_few_tries() {
-        let now = Mark::at(Time::from_secs(1.0));
-        let traced_at = |secs: f64| Mark::at(Time::from_secs(secs)).0;
-        let (mut order, mut turn) = (Order::new(), 0);
-        let turns: Vec<usize> = (0..64).map(|_| order.next(u64::MAX, &mut turn)).collect();
-        let mut marks = TileMarks([0; TILE_PIXELS]);
-        let mut chosen =
-            |marks: &TileMarks| order.old_enough(now, marks, u64::MAX, &mut turn, enough(1.0));
-        marks.0[turns[0]] = traced_at(0.9);
-        assert_eq!(chosen(&marks), turns[1], "the first is younger than half a second");
-        for &within in &turns[2..6] {
-            marks.0[within] = traced_at(0.9);
+    /// A tile whose turn is at the beginning of the order.
+    #[derive(Default)]
+    struct Tile {
+        turn: u8,
+        recent: Recent,
+    }
+
+    impl Tile {
+        fn next(&mut self, order: &mut Order) -> usize {
+            order.next_but_recent(u64::MAX, &mut self.recent, &mut self.turn)
         }
-        marks.0[turns[4]] = traced_at(0.8);
-        assert_eq!(chosen(&marks), turns[4], "the oldest of four young ones");
-        assert_eq!(chosen(&marks), turns[6]);
+    }
+
+    #[test]
+    fn ranks_are_places_in_the_order() {
+        let order = Order::new();
+        for within in 0..TILE_PIXELS {
+            assert_eq!(order.peek(RANKS[within]), within);
+        }
+    }
+
+    #[test]
+    fn who_was_traced_lately_is_passed_over_until_two_parts_later() {
+        let mut order = Order::new();
+        let turns: Vec<usize> = order.order.iter().map(|&within| within.into()).collect();
+        let mut tile = Tile::default();
+        [0, 2, 3, 40].into_iter().for_each(|rank| tile.recent.traced(turns[rank]));
+        let seen: Vec<usize> = (0..60).map(|_| tile.next(&mut order)).collect();
+        let mut others = turns.clone();
+        others.retain(|within| ![0, 2, 3].map(|rank| turns[rank]).contains(within));
+        assert_eq!(seen[..60], others[..60], "the 41st is looked at again: two parts have passed");
+        assert_eq!(tile.next(&mut order), turns[63]);
+        assert_eq!(tile.next(&mut order), turns[0]);
+    }
+
+    #[test]
+    fn where_all_were_traced_lately_the_next_is_taken() {
+        let mut order = Order::new();
+        let mut tile = Tile::default();
+        (0..TILE_PIXELS).for_each(|within| tile.recent.traced(within));
+        for rank in 0..4 {
+            assert_eq!(tile.next(&mut order), order.peek(rank));
+        }
+        let mut order = Order::new();
+        (0..TILE_PIXELS).for_each(|within| tile.recent.traced(within));
+        let [last, next] = [order.peek(63), order.peek(tile.turn)];
+        tile.recent.now &= !(1 << 63);
+        tile.recent.before = 0;
+        assert_eq!(tile.next(&mut order), last, "however far it is");
+        assert_ne!(last, next);
+    }
+
+    #[test]
+    fn cut_tiles_have_nothing_but_their_order() {
+        let (mut order, mut turn, mut recent) = (Order::new(), 0, Recent::default());
+        let pixels = 0x0f0f;
+        (0..TILE_PIXELS).for_each(|within| recent.traced(within));
+        for _ in 0..20 {
+            assert!(pixels >> order.next_but_recent(pixels, &mut recent, &mut turn) & 1 == 1);
+        }
     }
 }

@@ -3,12 +3,12 @@
 //! ```text
 //! got ← got + a · Σ w + b · Σ e     for every block, once per draw of a Σ w + b Σ e tiles
 //! if got ≥ g:   that many tiles of the block are drawn, got ← 0
-//! g = number of blocks / 100, in [1, 2]
+//! g = number of blocks / 100, in [1, 2.5]
 //! ```
 //!
 //! So what a sweep looks at is a 16th of the tiles: in 4K that takes as long as in small pictures one over all of them. Blocks that get little are
 //! left alone meanwhile, and those drawn from are looked at once for several tiles. In small pictures most blocks have a draw or two per batch
-//! in any case; in large ones they wait for two, since each look at a block waits for memory. More at a time would be faster still, but then what
+//! in any case; in large ones they wait for two or three, since each look at a block waits for memory. More at a time would be faster still, but then what
 //! a block has got is shared out by weights that have changed meanwhile.
 
 use super::block::{BLOCK, Due, push_bits, sum};
@@ -19,7 +19,7 @@ use crate::wide::{self, F8, Task, Unit};
 /// How many blocks are swept over at a time: one for each bit of a mask.
 const LANES: usize = 32;
 /// The most draws that a block waits for.
-const MOST_AT_ONCE: f32 = 2.0;
+const MOST_AT_ONCE: f32 = 2.5;
 /// For every so many blocks (102,400 pixels) it waits for one more.
 const BLOCKS_PER_DRAW: f32 = 100.0;
 /// How many blocks ahead of the one at hand the next is fetched.

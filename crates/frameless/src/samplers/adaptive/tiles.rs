@@ -4,6 +4,7 @@
 //! of it, whoever it belongs to.
 
 use super::front::TileFront;
+use super::order::Recent;
 use super::why::{Reasons, Why};
 use crate::rates::Evidence;
 use crate::traced::Place;
@@ -18,8 +19,11 @@ pub(super) struct Tile {
     pub(super) evidence: Evidence,
     /// How old samples have been, on average, when they were replaced.
     pub(super) mean_age_secs: f32,
+    pub(super) recent: Recent,
     /// Whose turn it is in it: see [`Order`](super::order::Order).
     pub(super) turn: u8,
+    /// Whether it is in the queue of those with pixels beside changes.
+    pub(super) waits: bool,
 }
 
 const _: () = assert!(size_of::<Tile>() == 64);
