@@ -1,7 +1,7 @@
 //! The learned rate of change of every tile.
 
 use crate::Size;
-use crate::tile::{LINE, PerTile, TileGrid};
+use crate::tile::{PerTile, TileGrid};
 
 /// How fast the picture becomes wrong, tile by tile:
 ///
@@ -71,12 +71,6 @@ impl Rates {
     #[inline(always)]
     pub(crate) fn of_tiles(&self) -> &PerTile {
         &self.tiles
-    }
-
-    /// Begin to fetch what is known of a tile.
-    #[inline(always)]
-    pub(crate) fn prefetch(&self, tile: usize) {
-        self.tiles.prefetch(tile / LINE);
     }
 
     /// Of the picture whose tiles these are.

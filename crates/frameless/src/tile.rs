@@ -180,6 +180,11 @@ impl PerTile {
         &mut self.0[tile / LINE].0[tile % LINE]
     }
 
+    /// Of all tiles, and what is behind the last.
+    pub(crate) fn all_mut(&mut self) -> impl Iterator<Item = &mut f32> {
+        self.0.iter_mut().flat_map(|line| &mut line.0)
+    }
+
     pub(crate) fn lines(&self) -> usize {
         self.0.len()
     }

@@ -30,7 +30,7 @@ impl<U: Unit> Due<U> {
         let Due { got, shares, sum, first } = self;
         let part = got / sum;
         // Nor where shares are too small for numbers: nobody is drawn without end.
-        if sum <= 0.0 || !part.is_finite() {
+        if !part.is_finite() {
             return;
         }
         let part = F8::<U>::splat(part);

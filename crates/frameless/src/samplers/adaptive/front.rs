@@ -244,7 +244,7 @@ fn find_near(changed: &[(Place, Mark)], grid: &TileGrid, near: &mut Vec<Near>) -
         let four = near[count..].first_chunk_mut::<4>().expect("room for four each");
         let mut next = 0;
         let mut put = |tile: u32, pixels: u64, is_there: bool| {
-            four[next] = Near { tile, found, pixels };
+            four[next % 4] = Near { tile, found, pixels };
             next += usize::from(is_there);
         };
         put(tile, own, true);
@@ -275,6 +275,7 @@ impl Task for LookAtNear<'_> {
     fn run<U: Unit>(self) {
         let LookAtNear { near, traced, fresh, tiles, begin_to_wait, count } = self;
         let first_row = |pixels: u64| (pixels.trailing_zeros() / 8).min(5) as usize;
+        let mut waiting = 0;
         for (i, &Near { tile, found, pixels }) in near.iter().enumerate() {
             if let Some(later) = near.get(i + AHEAD) {
                 let (marks, first) =
@@ -296,10 +297,11 @@ impl Task for LookAtNear<'_> {
             let Tile { front, waits, .. } = tiles.of_mut(tile as usize);
             front.beside |= stale;
             // Neither is it guessed who begins to wait.
-            begin_to_wait[*count] = tile;
-            *count += usize::from((stale != 0) & !*waits);
+            begin_to_wait[waiting] = tile;
+            waiting += usize::from((stale != 0) & !*waits);
             *waits |= stale != 0;
         }
+        *count = waiting;
     }
 }
 

@@ -249,7 +249,6 @@ impl State {
             return;
         }
         self.tiles.prefetch(tile);
-        self.rates.prefetch(tile);
     }
 
     fn observe_refinement(&mut self, place: Place, n: u16, refinement: &Refinement) {

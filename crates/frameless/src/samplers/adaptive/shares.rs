@@ -85,6 +85,7 @@ impl Shares {
     /// Nobody has a share yet. How soon tiles are drawn first is random.
     pub(super) fn new(tiles: usize, rng: &mut Rng) -> Shares {
         let mut credit = PerTile::new(tiles);
+        credit.all_mut().for_each(|credit| *credit = f32::NEG_INFINITY);
         (0..tiles).for_each(|tile| *credit.of_mut(tile) = rng.unit_f32());
         let nothing = vec![0.0; credit.lines().next_multiple_of(LANES)];
         let at_once = (credit.lines() as f32 / BLOCKS_PER_DRAW).clamp(1.0, MOST_AT_ONCE);
@@ -243,15 +244,19 @@ impl<W: Weigh> Task for Draw<'_, W> {
                 }
             }
             let block = shares.due[i] as usize;
-            let [w_left, w_right] = shares.weights_of::<U>(block, weights);
-            let [e_left, e_right] = halves(shares.even_of(block));
+            // Who is not there is never drawn, whatever its weight.
+            let [w_left, w_right] = weights.halves::<U>(block);
             let (per_weight, per_even) = (F8::splat(a), F8::splat(b));
+            let [e_left, e_right] = match shares.evens.lines() {
+                0 => [per_even; 2],
+                _ => {
+                    let [left, right] = shares.evens.halves(block);
+                    [per_even * left, per_even * right]
+                }
+            };
             let due = Due {
                 got: std::mem::take(&mut shares.got[block]),
-                shares: [
-                    per_weight * w_left + per_even * e_left,
-                    per_weight * w_right + per_even * e_right,
-                ],
+                shares: [per_weight * w_left + e_left, per_weight * w_right + e_right],
                 sum: a * shares.weight[block] + b * shares.even[block],
                 first: (block * BLOCK) as u32,
             };
