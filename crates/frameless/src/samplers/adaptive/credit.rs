@@ -29,7 +29,7 @@ const EVENLY: f32 = 0.2;
 const LEAST_RATE: f32 = 1e-7;
 
 /// How many tiles ahead of the one at hand the next is fetched.
-const AHEAD: usize = 48;
+const AHEAD: usize = 96;
 
 /// Whose turn it is, among the tiles and in each of them.
 pub(crate) struct Credit {

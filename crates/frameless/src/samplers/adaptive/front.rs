@@ -28,7 +28,7 @@ const ADAPT_PER_SEC: f64 = 29.0;
 const MOST_AT_ONCE: f64 = 2.0;
 
 /// How many tiles ahead of the one looked at the next is fetched.
-const AHEAD: usize = 32;
+const AHEAD: usize = 64;
 /// So many changes are looked at together.
 const MANY: usize = 1024;
 
