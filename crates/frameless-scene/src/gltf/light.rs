@@ -11,6 +11,7 @@ use super::error::Fault;
 use super::json::Json;
 use super::limits::{Limits, within};
 use super::node::Hierarchy;
+use super::warnings::Warnings;
 
 const EXTENSION: &str = "KHR_lights_punctual";
 
@@ -19,12 +20,14 @@ pub(super) fn load_lights(
     root: &Json<'_>,
     hierarchy: &Hierarchy,
     limits: &Limits,
+    warnings: &mut Warnings,
 ) -> Result<Vec<Light>, Fault> {
     let definitions = match root.extension(EXTENSION)? {
         Some(extension) => extension.list("lights")?,
         None => Vec::new(),
     };
-    let definitions = definitions.iter().map(parse_light).collect::<Result<Vec<_>, _>>()?;
+    let parsed = definitions.iter().map(|light| parse_light(light, warnings));
+    let definitions = parsed.collect::<Result<Vec<_>, _>>()?;
     let mut lights = Vec::new();
     for (file_index, node) in root.list("nodes")?.iter().enumerate() {
         let Some(extension) = node.extension(EXTENSION)? else { continue };
@@ -38,7 +41,7 @@ pub(super) fn load_lights(
 }
 
 /// A light at node 0.
-fn parse_light(json: &Json<'_>) -> Result<Light, Fault> {
+fn parse_light(json: &Json<'_>, warnings: &mut Warnings) -> Result<Light, Fault> {
     let color = Vec3::from_array(json.numbers_or("color", [1.0; 3])?);
     let intensity = json.number_or("intensity", 1.0)?;
     let wrong = |field: &str, wanted: &str, came: &dyn Display| {
@@ -59,23 +62,32 @@ fn parse_light(json: &Json<'_>) -> Result<Light, Fault> {
     let kind = match kind.text()? {
         "point" => LightKind::Point,
         "directional" => LightKind::Directional,
-        "spot" => parse_cone(json)?,
+        "spot" => parse_cone(json, warnings)?,
         _ => return Err(kind.fault("point, spot or directional")),
     };
     Ok(Light { node: 0, kind, intensity: color * intensity, range })
 }
 
-fn parse_cone(json: &Json<'_>) -> Result<LightKind, Fault> {
+/// What the specification forbids but can be drawn is: as wide as may be, with a border as sharp as may be.
+fn parse_cone(json: &Json<'_>, warnings: &mut Warnings) -> Result<LightKind, Fault> {
     let Some(spot) = json.field("spot")? else { return Ok(cone(0.0, FRAC_PI_4)) };
     let inner = spot.number_or("innerConeAngle", 0.0)?;
     let outer = spot.number_or("outerConeAngle", FRAC_PI_4)?;
-    // Exporters write π/2 with too few digits, or equal angles for a sharp border.
-    const SLACK_RAD: f32 = 1e-4;
-    if inner < 0.0 || inner > outer + SLACK_RAD || outer <= 0.0 || outer > FRAC_PI_2 + SLACK_RAD {
+    if inner < 0.0 || outer <= 0.0 {
         let came = format!("{inner} and {outer}");
-        return Err(Fault::at(spot.pointer(), "cone angles with 0 <= inner <= outer <= π/2", came));
+        return Err(Fault::at(spot.pointer(), "cone angles with 0 <= inner < outer <= π/2", came));
     }
-    Ok(cone(inner, outer))
+    // Exporters write π/2 with too few digits.
+    const SLACK_RAD: f32 = 1e-4;
+    if outer > FRAC_PI_2 + SLACK_RAD {
+        let what = "spot lights with an outer cone angle above π/2 shine forwards only";
+        warnings.about(what, json.called("light"));
+    }
+    if inner >= outer {
+        let what = "spot lights whose inner cone angle is not less than the outer one have sharp borders there";
+        warnings.about(what, json.called("light"));
+    }
+    Ok(cone(inner.min(outer), outer))
 }
 
 fn cone(inner: f32, outer: f32) -> LightKind {

@@ -164,7 +164,7 @@ fn build(document: &mut Document<'_>, choice: &Choice) -> Result<Scene, Fault> {
     let skins = load_skins(document, &hierarchy)?;
     let weights_of = place_instances(&mut scene, document, &mut hierarchy, skins, meshes.same_as)?;
     scene.cameras = load_cameras(&root, &hierarchy, &mut document.budget)?;
-    scene.lights = load_lights(&root, &hierarchy, &limits)?;
+    scene.lights = load_lights(&root, &hierarchy, &limits, &mut document.warnings)?;
     scene.contents = load_contents(&root, &hierarchy)?;
     let nodes = Nodes { hierarchy: &hierarchy, weights_of: &weights_of };
     let (animation, movers) =

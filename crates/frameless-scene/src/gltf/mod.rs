@@ -9,7 +9,7 @@
 //! |---|---|---|---|
 //! | `.glb`, `.gltf`, `data:` URIs, files in its folder, EXT_meshopt_compression | images that cannot be decoded: a checker; damaged ones: as far as they go | GLB chunks of other types | a second binary chunk, other versions than 2.x, required extensions that are unknown |
 //! | triangles, strips, fans; indexed or not; normalised, quantised, sparse | joint weights that do not sum to 1: scaled; skins with joints elsewhere: rest shape | points, lines | indices and references that lead nowhere |
-//! | nodes with TRS or matrix, one scene, EXT_mesh_gpu_instancing | sheared matrices: without shear; the same mesh many times in one place, the same triangle a thousand times: once | other scenes | loops, two parents |
+//! | nodes with TRS or matrix, one scene, EXT_mesh_gpu_instancing | sheared matrices: without shear; matrix and TRS: the matrix; the same mesh many times in one place, the same triangle a thousand times: once | other scenes | loops, two parents |
 //! | all of a material with its textures, KHR_texture_transform, EXT_texture_webp, COLOR_0, TEXCOORD_0 to 3, TANGENT | | textures by TEXCOORD_4 and beyond | paths out of the folder |
 //! | KHR_materials_emissive_strength, _unlit, _ior, _specular, _transmission, _volume, _clearcoat, _sheen | thickness textures: volumes are as thick as they are modelled | other extensions | |
 //! | cameras, KHR_lights_punctual | none in the file: added, with a note | | angles out of range |

@@ -161,6 +161,13 @@ fn parse_transforms(nodes: &[Json<'_>], warnings: &mut Warnings) -> Result<Vec<T
 fn parse_transform(node: &Json<'_>, warnings: &mut Warnings) -> Result<Transform, Fault> {
     if let Some(matrix) = node.field("matrix")? {
         let matrix = Mat4::from_cols_array(&matrix.numbers()?);
+        for other in ["translation", "rotation", "scale"] {
+            if node.field(other)?.is_some() {
+                let what =
+                    "nodes with a matrix and something else that places them: the matrix counts";
+                warnings.about(what, node.called("node"));
+            }
+        }
         let (transform, error) = decompose(&matrix);
         if error > LARGEST_MATRIX_ERROR {
             let what = "sheared or projective matrices are drawn without shear and projection";

@@ -51,6 +51,20 @@ fn sheared_matrices_lose_their_shear_aloud() {
 }
 
 #[test]
+fn a_matrix_counts_more_than_what_else_places_its_node() {
+    let matrix = Mat4::from_translation(Vec3::X).to_cols_array();
+    for other in ["translation", "rotation", "scale"] {
+        let mut maker = Maker::new();
+        let numbers = if other == "rotation" { json!([0, 1, 0, 0]) } else { json!([5, 5, 5]) };
+        maker.push("nodes", json!({"name": "twice", "matrix": matrix, other: numbers}));
+        let scene = maker.load();
+        assert_eq!(scene.nodes[0].rest, Transform { translation: Vec3::X, ..Transform::IDENTITY });
+        let warning = &scene.warnings[0];
+        assert!(warning.contains("the matrix counts") && warning.contains("twice"), "{warning}");
+    }
+}
+
+#[test]
 fn rotations_get_length_one() {
     for (rotation, expected) in [
         ([0.0, 2.0, 0.0, 0.0], Quat::from_xyzw(0.0, 1.0, 0.0, 0.0)),
@@ -164,6 +178,37 @@ fn cameras_and_lights_stand_at_their_nodes() {
     let LightKind::Spot { cos_inner, cos_outer } = scene.lights[2].kind else { panic!("a spot") };
     assert!(cos_outer < cos_inner && (cos_outer - 0.5_f32.cos()).abs() < 1e-6);
     assert_eq!(scene.ambient, Vec3::ZERO);
+}
+
+#[test]
+fn forbidden_cones_are_drawn_as_far_as_they_can_be() {
+    let load = |inner: f32, outer: f32| {
+        let mut maker = Maker::new();
+        let spot = json!({"innerConeAngle": inner, "outerConeAngle": outer});
+        let lights = json!([{"name": "lamp", "type": "spot", "spot": spot}]);
+        maker.json["extensions"] = json!({"KHR_lights_punctual": {"lights": lights}});
+        maker.push("nodes", json!({"extensions": {"KHR_lights_punctual": {"light": 0}}}));
+        let scene = maker.load();
+        let LightKind::Spot { cos_inner, cos_outer } = scene.lights[0].kind else {
+            panic!("a spot")
+        };
+        let about = |warning: &&String| warning.contains("cone") && warning.contains("lamp");
+        ([cos_inner, cos_outer], scene.warnings.iter().filter(about).count())
+    };
+    for (inner, outer, border, warnings) in [
+        (0.2, 0.5, 0.5f32, 0),
+        (0.5, 0.5, 0.5, 1),
+        (1.2, 0.5, 0.5, 1),
+        (0.2, 2.5, std::f32::consts::FRAC_PI_2, 1),
+        (3.0, 2.5, std::f32::consts::FRAC_PI_2, 2),
+    ] {
+        let ([cos_inner, cos_outer], came) = load(inner, outer);
+        let case = format!("{inner}, {outer}: {cos_inner}, {cos_outer}");
+        assert_eq!(came, warnings, "{case}");
+        assert!((cos_outer - border.cos()).abs() < 1e-6, "{case}");
+        assert!(cos_inner > cos_outer, "{case}");
+        assert_eq!(inner >= outer, cos_inner < cos_outer + 1e-3, "{case}");
+    }
 }
 
 /// Seen from the added camera, every corner lies inside a picture of 4:3, which they fill.
