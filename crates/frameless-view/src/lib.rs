@@ -31,7 +31,7 @@ pub use options::ViewOptions;
 ///
 /// # Errors
 /// [`NoDisplay`] if there is none, or none that the graphics driver can draw on; [`LoadError`](frameless_scene::LoadError) if the scene
-/// would take too long to draw.
+/// would take too long to draw; any other error if the display goes away while the window is open.
 pub fn run(options: ViewOptions) -> anyhow::Result<()> {
     no_display::check(|name| std::env::var_os(name))?;
     let (scene, limits) = (&options.scene, &options.opener.limits);
@@ -52,5 +52,6 @@ pub fn run(options: ViewOptions) -> anyhow::Result<()> {
     let create: eframe::AppCreator<'_> = Box::new(move |context| {
         Ok(Box::new(app::App::new(context, world, options)?) as Box<dyn eframe::App>)
     });
-    eframe::run_native("frameless", native, create).map_err(|error| no_display::explain(&error))
+    no_display::while_connected(|| eframe::run_native("frameless", native, create))?
+        .map_err(|error| no_display::explain(&error))
 }

@@ -2,6 +2,9 @@
 
 use std::ffi::OsString;
 use std::fmt;
+use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// No window can be opened here; says why in one line.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,9 +51,57 @@ pub(crate) fn explain(error: &eframe::Error) -> anyhow::Error {
     }
 }
 
+/// What the window comes to. The window library panics where its connection to an X server breaks, as it does when that ends.
+///
+/// # Errors
+/// If the connection has been lost.
+///
+/// # Panics
+/// As `window` does of anything else.
+pub(crate) fn while_connected<T>(window: impl FnOnce() -> T) -> anyhow::Result<T> {
+    let is_lost = Arc::new(AtomicBool::new(false));
+    let usual: Arc<dyn Fn(&PanicHookInfo<'_>) + Send + Sync> = panic::take_hook().into();
+    let (told, others) = (Arc::clone(&is_lost), Arc::clone(&usual));
+    panic::set_hook(Box::new(move |panic| {
+        if panic.payload_as_str().is_some_and(speaks_of_connection) {
+            told.store(true, Ordering::Relaxed);
+        } else if !told.load(Ordering::Relaxed) {
+            others(panic);
+        }
+    }));
+    let result = panic::catch_unwind(AssertUnwindSafe(window));
+    panic::set_hook(Box::new(move |panic| usual(panic)));
+    match result {
+        Ok(result) => Ok(result),
+        Err(_) if is_lost.load(Ordering::Relaxed) => {
+            Err(anyhow::anyhow!("the connection to the display was lost"))
+        }
+        Err(panic) => panic::resume_unwind(panic),
+    }
+}
+
+/// As an error of the X client library is written that some result is unwrapped with.
+fn speaks_of_connection(panic: &str) -> bool {
+    panic.contains("Connection(IoError") || panic.contains("ConnectionError(IoError")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_lost_connection_is_an_error_and_other_panics_stay_panics() {
+        let lost: Result<(), &str> = Err("an IoError");
+        let error =
+            while_connected(|| panic!("`unwrap()` on an `Err`: Connection(IoError({lost:?}))"));
+        let error: anyhow::Result<()> = error;
+        let text = error.expect_err("it is lost").to_string();
+        assert!(text.contains("connection to the display"), "{text}");
+        assert_eq!(while_connected(|| 7).expect("nothing is lost"), 7);
+        let other =
+            panic::catch_unwind(|| while_connected(|| panic!("something else")).map(|()| 0));
+        assert!(other.is_err(), "a panic that is none of the display's");
+    }
 
     #[test]
     #[cfg(all(unix, not(target_os = "macos")))]
