@@ -33,6 +33,31 @@ pub(crate) struct Asked {
 /// which they were met.
 const BLOCKED: u32 = 4;
 
+/// How long lights are asked.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Patience {
+    /// In the order of the scene each so many'th is asked, the first included; and none any more
+    pub(crate) stride: usize,
+    /// once [`Stack::boxes`] is so many.
+    pub(crate) until: u64,
+    pub(crate) then: Then,
+}
+
+/// What comes of lights that are not asked.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Then {
+    /// The part of their light arrives that does of those that have been, or this one if these are none.
+    Assume(Vec3A),
+    /// One of them is asked for all, which a number in [0, 1) chooses: right in the mean. Without a stride.
+    Draw(f32),
+}
+
+/// The numbers of all lights, first those that are asked.
+fn in_turn(all: usize, stride: usize) -> impl Iterator<Item = usize> + Clone {
+    let asked = (0..all).step_by(stride);
+    asked.chain((0..all).filter(move |light| light % stride != 0))
+}
+
 /// Light that reaches a point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arriving {
@@ -96,6 +121,30 @@ impl Asked {
         Vec3A::select(self.offered.cmpgt(Vec3A::ZERO), share, unknown)
     }
 
+    /// The answers of these lights, if this part of their light arrives.
+    #[inline(never)]
+    fn assume(
+        &mut self,
+        moment: &Moment,
+        point: &Point,
+        settings: &Settings,
+        lights: impl Iterator<Item = usize>,
+        share: Vec3A,
+    ) {
+        for index in lights {
+            if let Some(arriving) = Arriving::at(point, &moment.lights[index], settings) {
+                self.add(index, arriving, share);
+            }
+        }
+    }
+
+    /// Of the lights from this one on nobody knows whether something stands before them.
+    fn forget_from(&mut self, light: usize) {
+        if light < 32 {
+            self.lit &= (1 << light) - 1;
+        }
+    }
+
     /// A light's answer, of which this part passes; returns what arrives, if anything does.
     #[inline(always)]
     fn add(&mut self, index: usize, arriving: Arriving, passes: Vec3A) -> Option<Arriving> {
@@ -122,27 +171,52 @@ impl World {
         moment: &Moment,
         point: &Point,
         settings: &Settings,
-        stack: &mut Stack,
+        (stack, patience): (&mut Stack, Patience),
         probe: &mut impl Probe,
         mut take: impl FnMut(Arriving),
     ) -> Asked {
-        let mut asked = Asked::NOBODY;
-        for (index, light) in moment.lights.iter().enumerate() {
-            let Some(arriving) = Arriving::at(point, light, settings) else {
-                probe.note(|| format!("  light {index}: faces away or gives nothing"));
-                continue;
+        let (mut asked, all) = (Asked::NOBODY, moment.lights.len());
+        stack.boxes += all as u64;
+        for (turn, index) in in_turn(all, patience.stride).enumerate() {
+            let is_asked = turn * patience.stride < all && stack.boxes < patience.until;
+            let (index, stands_for) = match patience.then {
+                _ if is_asked => (index, 1),
+                Then::Draw(number) => {
+                    let left = all - turn;
+                    let drawn = ((number * left as f32) as usize).min(left - 1);
+                    asked.forget_from(turn);
+                    (turn + drawn, left)
+                }
+                Then::Assume(unknown) => {
+                    let share = asked.share(unknown);
+                    probe.note(|| {
+                        format!("  of those after light {index} {share:.3} is taken to arrive")
+                    });
+                    let rest = in_turn(all, patience.stride).skip(turn);
+                    asked.assume(moment, point, settings, rest, share);
+                    break;
+                }
             };
-            let shadow_ray = arriving.shadow_ray(point, light);
-            let way = (&shadow_ray, reach(light));
-            let (passes, holes) = self.passing_counted(moment, way, true, stack);
-            asked.effort += if passes == Vec3A::ZERO { BLOCKED } else { 1 + holes };
-            let arrived = asked.add(index, arriving, passes);
-            probe.note(|| {
-                let (cos, contribution) = (arriving.cos, arrived.map_or(Vec3A::ZERO, |a| a.per_albedo()));
-                format!("  light {index}: {passes:.3} of it passes: {contribution:.5} per albedo (cos {cos:.4})")
-            });
-            if let Some(arrived) = arrived {
-                take(arrived);
+            let light = &moment.lights[index];
+            if let Some(mut arriving) = Arriving::at(point, light, settings) {
+                arriving.irradiance *= stands_for as f32;
+                let shadow_ray = arriving.shadow_ray(point, light);
+                let way = (&shadow_ray, reach(light));
+                let (passes, holes) = self.passing_counted(moment, way, true, stack);
+                asked.effort += if passes == Vec3A::ZERO { BLOCKED } else { 1 + holes };
+                let arrived = asked.add(index, arriving, passes);
+                probe.note(|| {
+                    let (cos, contribution) = (arriving.cos, arrived.map_or(Vec3A::ZERO, |a| a.per_albedo()));
+                    format!("  light {index}: {passes:.3} of it passes: {contribution:.5} per albedo (cos {cos:.4})")
+                });
+                if let Some(arrived) = arrived {
+                    take(arrived);
+                }
+            } else {
+                probe.note(|| format!("  light {index}: faces away or gives nothing"));
+            }
+            if stands_for > 1 {
+                break;
             }
         }
         asked
@@ -157,11 +231,7 @@ impl World {
         share: Vec3A,
     ) -> Asked {
         let mut asked = Asked::NOBODY;
-        for (index, light) in moment.lights.iter().enumerate() {
-            if let Some(arriving) = Arriving::at(point, light, settings) {
-                asked.add(index, arriving, share);
-            }
-        }
+        asked.assume(moment, point, settings, 0..moment.lights.len(), share);
         asked
     }
 
@@ -175,7 +245,8 @@ impl World {
         stack: &mut Stack,
     ) -> [Asked; SHADED] {
         let mut asked = [Asked::NOBODY; SHADED];
-        for (index, light) in moment.lights.iter().enumerate() {
+        let all = moment.lights.len();
+        for (index, light) in moment.lights.iter().enumerate().step_by(self.efforts.stride) {
             let mut arriving = [None; SHADED];
             let (mut rays, mut count) = ([Ray::NONE; SHADED], 0);
             for (arriving, point) in arriving.iter_mut().zip(points) {
@@ -194,6 +265,14 @@ impl World {
                 {
                     asked.add(index, arriving, passes);
                 }
+            }
+        }
+        if self.efforts.stride > 1 {
+            let others = in_turn(all, self.efforts.stride).skip(all.div_ceil(self.efforts.stride));
+            for (asked, point) in asked.iter_mut().zip(points) {
+                let Some(point) = point else { continue };
+                let share = asked.share(Vec3A::ONE);
+                asked.assume(moment, point, settings, others.clone(), share);
             }
         }
         asked

@@ -274,3 +274,29 @@ fn smooth_normals_turn_with_the_joint() {
     let [a, b, c] = point.anchor.to_array();
     assert!((a + b + c - 1.0).abs() < 1e-6 && point.anchor.min_element() >= 0.0, "{point:?}");
 }
+
+/// However its tree has been made: that depends on what its moment has shown before.
+#[test]
+fn a_ray_that_enters_what_deforms_takes_its_price() {
+    let mut world = World::new(Arc::new(bending_ball()));
+    let made = world.deforming[0].price;
+    assert!((5..100).contains(&made), "{made}");
+    world.deforming[0].price = 1_000;
+    let (straight, mut by_steps) = (world.moment(1.0), world.moment(0.0));
+    for step in 1..=10 {
+        world.update_moment(0.1 * f64::from(step), &mut by_steps);
+    }
+    let mut entered = 0;
+    for ray in random_rays(&mut Rng::new(3), 200) {
+        let [straight, by_steps] = [&straight, &by_steps].map(|moment| {
+            let mut stack = Stack::new();
+            moment.targets(&world).closest(&ray, &mut stack);
+            stack.boxes
+        });
+        assert_eq!(straight, by_steps, "{ray:?}");
+        // The root of the tree over all instances, and one leaf.
+        assert!([1, 2 + 1_000].contains(&straight), "{straight}");
+        entered += u32::from(straight > 1_000);
+    }
+    assert!(entered > 50, "{entered}");
+}

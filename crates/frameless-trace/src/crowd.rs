@@ -15,6 +15,7 @@ use frameless_scene::{Limits, LoadError, Place, Problem, Scene};
 use glam::{Vec3, Vec3A};
 
 use crate::build::{Blas, TightBox};
+use crate::forecast::{Efforts, Forecast, most_per_sample};
 use crate::leaf::Leaf;
 use crate::moment::Moment;
 use crate::top::{Placed, Shape};
@@ -34,14 +35,29 @@ struct Crowd {
     secs: f64,
 }
 
+/// What is known of a world that may be drawn.
+#[derive(Clone, Debug, Default)]
+struct Weighed {
+    densest: Option<Crowd>,
+    /// Of some views at a few moments.
+    forecasts: Vec<Forecast>,
+    /// Per deformation: the highest E of its tree.
+    prices: Vec<u32>,
+}
+
 impl World {
-    /// The world of a scene that a stranger may have made, as [`World::new`] makes it. `file` is for the message.
+    /// The world of a scene that a stranger may have made: as [`World::new`] makes it, but samples that would take very long are not quite
+    /// what they ought to be. `file` is for messages.
     ///
     /// # Errors
     /// If its surfaces lie on top of each other so much that pictures would take long: where, and the limit, see [`Limits::overlap`].
     pub fn open(file: &str, scene: Arc<Scene>, limits: &Limits) -> Result<World, LoadError> {
-        let world = World::new(scene);
-        world.check_overlap(file, limits)?;
+        let mut world = World::new(scene);
+        let weighed = world.weigh(file, limits)?;
+        world.efforts = world.efforts_for(file, limits, &weighed.forecasts);
+        for (deforming, price) in world.deforming.iter_mut().zip(weighed.prices) {
+            deforming.price = price;
+        }
         Ok(world)
     }
 
@@ -50,64 +66,111 @@ impl World {
     /// # Errors
     /// As of [`World::open`].
     pub fn check_overlap(&self, file: &str, limits: &Limits) -> Result<u64, LoadError> {
+        Ok(self.weigh(file, limits)?.densest.map_or(0, |crowd| crowd.boxes as u64))
+    }
+
+    fn weigh(&self, file: &str, limits: &Limits) -> Result<Weighed, LoadError> {
+        /// After the first.
+        const MOMENTS: u32 = 4;
+        let duration = self.scene().animation.duration_secs;
+        let moments = if duration > 0.0 { MOMENTS } else { 0 };
+        let refused = |(place, problem)| LoadError { file: file.to_owned(), place, problem };
+        let mut moment = self.moment(0.0);
+        let mut weighed = Weighed { prices: vec![0; self.deforming.len()], ..Weighed::default() };
+        for k in 0..=moments {
+            let secs = duration * f64::from(k) / f64::from(MOMENTS);
+            self.update_moment(secs, &mut moment);
+            let crowd = self.densest_at(&moment, secs, &mut weighed.prices);
+            crowd.iter().try_for_each(|crowd| self.bear(crowd, limits)).map_err(refused)?;
+            weighed.densest = weighed.densest.into_iter().chain(crowd).reduce(denser);
+            let forecasts = self.forecasts(&moment);
+            forecasts.iter().try_for_each(|one| self.allow(one, limits)).map_err(refused)?;
+            weighed.forecasts.extend(forecasts);
+        }
+        if let Some(crowd) = weighed.densest
+            && crowd.boxes as u64 > Limits::default().overlap
+        {
+            let boxes = crowd.boxes as u64;
+            log::warn!(
+                "{file}: surfaces lie on top of each other, or nearly so: a ray has about {boxes} boxes to ask, and pictures may take long"
+            );
+        }
+        Ok(weighed)
+    }
+
+    /// # Errors
+    /// If there is too much to ask in the crowd.
+    fn bear(&self, crowd: &Crowd, limits: &Limits) -> Result<(), (Place, Problem)> {
         /// As if there were two lights: `direct` asks all of them from every point.
         const RAYS: u64 = 3;
-        let Some(crowd) = self.densest(limits.overlap) else { return Ok(0) };
+        /// So many times the limit may lie on a line: rays stop at what they meet first, and what they ask until then is tried.
+        const HIDDEN: u64 = 2;
         let (scene, boxes) = (self.scene(), crowd.boxes as u64);
         let of_all_rays = boxes.saturating_mul(1 + scene.lights.len() as u64);
-        let (limit, came) = match boxes <= limits.overlap {
-            true => (limits.overlap.saturating_mul(RAYS), of_all_rays),
-            false => (limits.overlap, boxes),
-        };
-        if came <= limit {
-            if boxes > Limits::default().overlap {
-                log::warn!(
-                    "{file}: surfaces lie on top of each other, or nearly so: a ray has about {boxes} boxes to ask, and pictures take long"
-                );
+        let most_of_all = limits.overlap.saturating_mul(RAYS);
+        let most = limits.overlap.saturating_mul(HIDDEN);
+        let (what, came, limit) = match crowd.secs {
+            0.0 if boxes > most => {
+                ("boxes of surfaces on top of each other for a ray", boxes, most)
             }
-            return Ok(boxes);
-        }
+            _ if boxes > most => {
+                ("boxes of surfaces on top of each other for a ray, as things move", boxes, most)
+            }
+            _ if of_all_rays > most_of_all => {
+                ("boxes of surfaces for the rays to all lights", of_all_rays, most_of_all)
+            }
+            _ => return Ok(()),
+        };
         let node = scene.instances[crowd.instance].node as usize;
         let place = match scene.contents.nodes.get(node) {
             Some(number) => Place::Pointer(format!("/nodes/{number}")),
             None => Place::Whole,
         };
-        let what = match crowd.secs {
-            _ if boxes <= limits.overlap => "boxes of surfaces for the rays to all lights",
-            0.0 => "boxes of surfaces on top of each other for a ray",
-            _ => "boxes of surfaces on top of each other for a ray, as things move",
-        };
-        let problem = Problem::Limit { what, came, limit, enough: None };
-        Err(LoadError { file: file.to_owned(), place, problem })
+        Err((place, Problem::Limit { what, came, limit, enough: None }))
     }
 
-    /// The densest crowd, at a few moments, or the first that is denser than `enough`.
-    fn densest(&self, enough: u64) -> Option<Crowd> {
-        /// After the first.
-        const MOMENTS: u32 = 4;
-        let duration = self.scene().animation.duration_secs;
-        let moments = if duration > 0.0 { MOMENTS } else { 0 };
-        let mut moment = self.moment(0.0);
-        let mut densest = None;
-        for k in 0..=moments {
-            let secs = duration * f64::from(k) / f64::from(MOMENTS);
-            self.update_moment(secs, &mut moment);
-            densest = densest.into_iter().chain(self.densest_at(&moment, secs)).reduce(denser);
-            if densest.is_some_and(|crowd| crowd.boxes as u64 > enough) {
-                break;
-            }
+    /// # Errors
+    /// If what cannot be left out is too much.
+    fn allow(&self, forecast: &Forecast, limits: &Limits) -> Result<(), (Place, Problem)> {
+        let (came, limit) = (forecast.two_rays(self.scene().lights.len()), most_per_sample(limits));
+        let what = "boxes of surfaces for what is seen of one pixel";
+        match came <= limit {
+            true => Ok(()),
+            false => Err((Place::Whole, Problem::Limit { what, came, limit, enough: None })),
         }
-        densest
     }
 
-    fn densest_at(&self, moment: &Moment, secs: f64) -> Option<Crowd> {
+    /// So that pictures of these take no longer than they may.
+    fn efforts_for(&self, file: &str, limits: &Limits, forecasts: &[Forecast]) -> Efforts {
+        let (lights, most) = (self.scene().lights.len(), most_per_sample(limits));
+        let stride = forecasts.iter().map(|one| one.stride(lights, most)).max().unwrap_or(1);
+        if stride > 1 {
+            let asked = lights.div_ceil(stride);
+            log::warn!(
+                "{file}: pictures would take long: of {lights} lights {asked} are asked what stands before them; --max-overlap raises that"
+            );
+        }
+        let usual = Efforts::default();
+        let direct = forecasts.iter().map(|one| one.direct(stride, most)).min();
+        let path = forecasts.iter().map(|one| one.path(lights, most)).min();
+        let [direct, path] = [direct.unwrap_or(usual.direct), path.unwrap_or(usual.path)];
+        Efforts { stride, direct, path }
+    }
+
+    /// `prices`: per deformation the highest E of its tree so far.
+    fn densest_at(&self, moment: &Moment, secs: f64, prices: &mut [u32]) -> Option<Crowd> {
         let targets = moment.targets(self);
         let mut known: Vec<Option<Sums>> = vec![None; self.scene().geometries.len()];
         let mut of_instance = |instance: usize, placed: &Placed| {
             let Some(tree) = targets.trees.of(placed.shape) else { return Sums::default() };
             match placed.shape {
                 // Poses of one shape are not alike.
-                Shape::Deforming(_) => Sums::of_tree(tree),
+                Shape::Deforming(index) => {
+                    let sums = Sums::of_tree(tree);
+                    let price = &mut prices[index as usize];
+                    *price = (*price).max(sums.whole as u32);
+                    sums
+                }
                 Shape::Mesh(_) | Shape::Sphere => {
                     let geometry = self.scene().instances[instance].geometry as usize;
                     *known[geometry].get_or_insert_with(|| Sums::of_tree(tree))
@@ -137,6 +200,11 @@ impl World {
         }
         densest
     }
+}
+
+/// Of a ray through all of a tree's box, on average: E, see the module.
+pub(crate) fn expected_boxes(tree: &Blas) -> u32 {
+    Sums::of_tree(tree).whole as u32
 }
 
 fn denser(a: Crowd, b: Crowd) -> Crowd {
@@ -271,6 +339,12 @@ mod tests {
     use crate::test_scenes as scenes;
     use frameless_scene::{Geometry, Mesh, Transform, TriangleMaterials, builtin};
 
+    fn densest(world: &World) -> f32 {
+        let prices = &mut vec![0; world.deforming.len()];
+        let crowd = world.densest_at(&world.moment(0.0), 0.0, prices);
+        crowd.map_or(0.0, |crowd| crowd.boxes)
+    }
+
     fn of_copies(triangles: usize, instances: usize, far: f32) -> f32 {
         let mesh = |triangles| Mesh {
             positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
@@ -287,7 +361,7 @@ mod tests {
             let place = Transform { translation: far * Vec3::ONE, ..Transform::IDENTITY };
             scenes::add(&mut scene, Geometry::Mesh(mesh(1)), place);
         }
-        World::new(Arc::new(scene)).densest(u64::MAX).map_or(0.0, |crowd| crowd.boxes)
+        densest(&World::new(Arc::new(scene)))
     }
 
     /// Four of them in nearly each leaf, and a node for up to eight of these.
@@ -306,8 +380,7 @@ mod tests {
     #[test]
     fn rooms_are_no_crowds() {
         for name in ["many", "shadow"] {
-            let world = World::new(Arc::new(builtin(name).expect("it is built in")));
-            let boxes = world.densest(u64::MAX).map_or(0.0, |crowd| crowd.boxes);
+            let boxes = densest(&World::new(Arc::new(builtin(name).expect("it is built in"))));
             assert!(boxes < 200.0, "{name}: {boxes}");
         }
     }

@@ -6,6 +6,7 @@ use frameless::Deformed as Vertices;
 use frameless_scene::{Deformed, Geometry, Mesh, Scene, State};
 use rayon::prelude::*;
 
+use crate::crowd::expected_boxes;
 use crate::refit::Flexible;
 
 /// One deforming instance at one moment. Its memory is used again for the next.
@@ -13,6 +14,8 @@ use crate::refit::Flexible;
 pub(crate) struct Deforming {
     now: Deformed,
     pub(crate) tree: Flexible,
+    /// What entering it counts for, see [`Stack::boxes`](crate::traverse::Stack::boxes).
+    pub(crate) price: u32,
     /// The mesh's, as the loop wants them.
     triangles: Arc<Vec<[u32; 3]>>,
     /// Whether it has been said that vertices are lost: of whichever instance, at whichever moment.
@@ -29,7 +32,8 @@ impl Deforming {
             let mesh = mesh(scene, index);
             let tree = Flexible::new(mesh, now.positions());
             let triangles = Arc::new(mesh.triangles.clone());
-            Deforming { now, tree, triangles, is_said: is_said.clone() }
+            let price = expected_boxes(&tree.blas);
+            Deforming { now, tree, price, triangles, is_said: is_said.clone() }
         });
         all.collect()
     }

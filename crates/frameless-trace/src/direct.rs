@@ -14,7 +14,7 @@ use frameless::Surface;
 use frameless_scene::{AlphaMode, Material};
 use glam::{Vec3, Vec3A};
 
-use crate::asking::Asked;
+use crate::asking::{Asked, Patience, Then};
 use crate::first::FirstSurface;
 use crate::fresnel::refracted;
 use crate::holes::{Chance, attenuation};
@@ -43,6 +43,9 @@ const MOST_EFFORT: u32 = 128;
 const LEAST_SHOWN: f32 = 1.0 / 512.0;
 /// Surfaces that blend behind which all is looked at, however little of it is seen. Hair has a dozen more, of which nothing is.
 const CLEAR_LAYERS: u32 = 4;
+
+/// A surface that is shaded takes as long as so many boxes, see [`Stack::boxes`].
+const SURFACE: u64 = 50;
 
 /// Is told what happens to a ray; see [`crate::explain`].
 pub(crate) trait Probe {
@@ -90,6 +93,10 @@ struct Picture {
     asked: u32,
     /// That of asking them, but for the first surface.
     effort: u32,
+    /// What [`Stack::boxes`] is when the sample has to come to its end,
+    until: u64,
+    /// and whether it is so many.
+    is_spent: bool,
 }
 
 /// What a leg has seen.
@@ -114,6 +121,24 @@ struct Lit<'a> {
 }
 
 impl World {
+    /// What a sample takes, in [boxes](Stack::boxes): its first surface, the lights that are asked there, and the rest.
+    pub(crate) fn effort_of(
+        &self,
+        moment: &Moment,
+        (ray, cone): (Ray, Cone),
+        settings: &Settings,
+        stack: &mut Stack,
+    ) -> [u64; 3] {
+        let begin = stack.boxes;
+        let met = self.nearest(moment, &ray, || Chance::Never, stack);
+        let there = stack.boxes;
+        let (mut picture, probe) = (Picture::new(ray, cone, settings), &mut NoProbe);
+        let goes_on = self.see(moment, &mut picture, met.as_ref(), settings, stack, probe);
+        let first = stack.boxes;
+        self.follow(moment, &mut picture, goes_on, settings, stack, probe);
+        [there - begin + SURFACE, first - there, stack.boxes - first]
+    }
+
     /// What comes back along a ray, which meets `met` first.
     #[inline(always)]
     pub(crate) fn radiance(
@@ -183,7 +208,10 @@ impl World {
         stack: &mut Stack,
         probe: &mut impl Probe,
     ) {
-        while goes_on || picture.take_up() {
+        picture.until = stack.boxes + self.efforts.direct;
+        while goes_on || (stack.boxes < picture.until && picture.take_up()) {
+            picture.is_spent = stack.boxes >= picture.until;
+            stack.boxes += SURFACE;
             let Leg { ray, culls, .. } = picture.leg;
             let met = match culls {
                 false => self.nearest(moment, &ray, || Chance::Never, stack),
@@ -240,9 +268,14 @@ impl World {
         if self.has_holes && !picture.may_strain(moment.lights.len()) {
             let share = picture.leg.lit_share;
             probe.note(|| format!("  {share:.3} of all lights is taken to arrive"));
+            stack.boxes += moment.lights.len() as u64;
             return World::assume_lights(moment, point, settings, share);
         }
-        let asked = self.ask_lights(moment, point, settings, stack, probe, |_| ());
+        let then = Then::Assume(picture.leg.lit_share);
+        // As those of many samples at once are.
+        let stride = if is_first { self.efforts.stride } else { 1 };
+        let patience = Patience { stride, until: picture.until, then };
+        let asked = self.ask_lights(moment, point, settings, (stack, patience), probe, |_| ());
         if !is_first {
             picture.effort += asked.effort;
         }
@@ -271,7 +304,8 @@ impl World {
             None => leg.throughput,
             Some(sigma) => leg.throughput * attenuation(sigma, leg.way_m(hit)),
         };
-        let alpha = if leg.layers < MOST_LAYERS { point.matter.alpha } else { 1.0 };
+        let is_last = picture.is_spent;
+        let alpha = if leg.layers < MOST_LAYERS && !is_last { point.matter.alpha } else { 1.0 };
         let throughput = alpha * arriving;
         if material.unlit {
             let gives = throughput * point.matter.base;
@@ -282,7 +316,8 @@ impl World {
             picture.see(self, alpha, || point.unlit(hit), throughput);
             return Seen::All { goes_on };
         }
-        let shares = Shares::of(point, -leg.ray.direction, depth < settings.max_depth);
+        let goes_on = depth < settings.max_depth && !is_last;
+        let shares = Shares::of(point, -leg.ray.direction, goes_on);
         probe.note(|| describe(point, material, &shares));
         Seen::Lit(Lit { material, shares, inside, alpha, arriving, throughput })
     }
@@ -348,7 +383,17 @@ impl Picture {
     fn new(ray: Ray, cone: Cone, settings: &Settings) -> Picture {
         let (leg, first) = (Leg::from_camera(ray, cone), FirstSurface::new(settings.surfaces));
         let (radiance, waiting) = (Vec3A::ZERO, Vec::new());
-        Picture { leg, radiance, first, waiting, branches: 0, asked: 0, effort: 0 }
+        Picture {
+            leg,
+            radiance,
+            first,
+            waiting,
+            branches: 0,
+            asked: 0,
+            effort: 0,
+            until: u64::MAX,
+            is_spent: false,
+        }
     }
 
     /// Takes note that so many lights are asked, if they may be.

@@ -14,7 +14,7 @@ use crate::numbers::{self, mixed};
 use crate::point::{Placement, Point, looked_at};
 use crate::ray::{Hit, Ray};
 use crate::sift::Sieve;
-use crate::top::Targets;
+use crate::top::{Shape, Targets};
 use crate::traverse::Stack;
 use crate::world::World;
 
@@ -24,6 +24,9 @@ const MOST_ASKED: u32 = 256;
 /// The same of a ray to a light: so many of all rays from one point, but of each no fewer than the first and no more than the second.
 const MOST_ASKED_OF_LIGHTS: u32 = 512;
 const ASKED_OF_LIGHT: [u32; 2] = [4, 128];
+/// A hole that is asked about takes as long as so many boxes, for a look-up in a texture; one in glass as so many of these.
+const HOLE: u64 = 8;
+const GLASS: u32 = 3;
 
 /// How a surface that blends decides whether it is there.
 #[derive(Clone, Copy, Debug)]
@@ -88,7 +91,9 @@ impl World {
                 && moment.placed(hit.instance).has_holes
             {
                 let (chance, culls) = (chance(index), false);
-                if !(Holes { world: self, moment, ray, chance, culls, asked: 0 }).stops(hit) {
+                let mut holes =
+                    Holes { world: self, moment, ray, chance, culls, asked: 0, counted: 0 };
+                if !holes.stops(hit) {
                     *found = self.nearest_through(moment, ray, (chance, culls), stack);
                 }
             }
@@ -121,8 +126,10 @@ impl World {
         (chance, culls): (Chance, bool),
         stack: &mut Stack,
     ) -> Option<Hit> {
-        let mut holes = Holes { world: self, moment, ray, chance, culls, asked: 0 };
-        moment.targets(self).closest_through(ray, &mut holes, stack)
+        let mut holes = Holes { world: self, moment, ray, chance, culls, asked: 0, counted: 0 };
+        let found = moment.targets(self).closest_through(ray, &mut holes, stack);
+        stack.boxes += HOLE * u64::from(holes.counted);
+        found
     }
 
     /// Which part of the light reaches a ray's origin from its point at `t_max`. Glass lets it pass, straight on, if `through_glass`.
@@ -211,11 +218,14 @@ impl World {
             ray,
             through_glass,
             left: may_ask,
+            counted: 0,
             passes: Vec3A::ONE,
             depth: Vec3A::ZERO,
             inside: Vec3A::ZERO,
         };
-        if targets.occluded_through(ray, t_max, &mut shade, stack) {
+        let is_shaded = targets.occluded_through(ray, t_max, &mut shade, stack);
+        stack.boxes += HOLE * u64::from(shade.counted);
+        if is_shaded {
             return (Vec3A::ZERO, 0);
         }
         (shade.result(t_max), may_ask - shade.left)
@@ -232,6 +242,8 @@ struct Holes<'a> {
     culls: bool,
     /// How often it has been asked about a hole.
     asked: u32,
+    /// Of those that are in [`Stack::boxes`].
+    counted: u32,
 }
 
 impl Sieve for Holes<'_> {
@@ -249,6 +261,7 @@ impl Sieve for Holes<'_> {
             return true;
         }
         self.asked += 1;
+        self.counted += u32::from(counts(self.moment, hit));
         if asks_side && !Placement::new(self.world, self.moment, self.ray, hit).is_front {
             return false;
         }
@@ -261,6 +274,11 @@ impl Sieve for Holes<'_> {
     }
 }
 
+/// Whether a hole is in [`Stack::boxes`]: of a mesh that deforms the price is.
+fn counts(moment: &Moment, hit: &Hit) -> bool {
+    !matches!(moment.placed(hit.instance).shape, Shape::Deforming(_))
+}
+
 /// What is on the way of light.
 struct Shade<'a> {
     world: &'a World,
@@ -269,6 +287,8 @@ struct Shade<'a> {
     through_glass: bool,
     /// How often it may be asked about a hole.
     left: u32,
+    /// How often it has been asked about one that is in [`Stack::boxes`].
+    counted: u32,
     passes: Vec3A,
     /// Σ σ · way in what encloses, of leaving minus entering it: in whichever order they are met.
     depth: Vec3A,
@@ -294,6 +314,9 @@ impl Sieve for Shade<'_> {
         self.left -= 1;
         let (patch, color) = looked_at(self.moment, mesh, hit);
         let coverage = coverage(self.world, material, &patch, color);
+        if counts(self.moment, hit) {
+            self.counted += if lets_pass { GLASS } else { 1 };
+        }
         let through = if lets_pass && coverage > 0.0 {
             let place = Placement::new(self.world, self.moment, self.ray, hit);
             self.glass(material, &place, hit)

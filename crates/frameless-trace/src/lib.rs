@@ -19,6 +19,7 @@ mod direct;
 mod emitters;
 mod explain;
 mod first;
+mod forecast;
 mod fresnel;
 mod holes;
 mod images;

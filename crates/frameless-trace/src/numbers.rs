@@ -61,6 +61,11 @@ impl Numbers {
         unit(mixed(self.seed ^ mixed(self.index_reversed ^ depth)))
     }
 
+    /// For the light that is asked there for others, likewise.
+    pub(crate) fn light(&self, depth: u32) -> f32 {
+        unit(mixed(self.seed ^ mixed(!self.index_reversed ^ depth)))
+    }
+
     /// For the ray that goes there: whether what blends is there.
     #[inline(always)]
     pub(crate) fn chance(&self, depth: u32) -> Chance {

@@ -19,6 +19,7 @@ use frameless::{Request, Surface};
 use frameless_scene::Material;
 use glam::Vec3A;
 
+use crate::asking::{Patience, Then};
 use crate::bsdf::Bsdf;
 use crate::direct::{NoProbe, Probe, finite, sky_surface};
 #[cfg(doc)]
@@ -59,6 +60,8 @@ struct Path {
     /// Absorption per metre of what the path is inside, if that is known.
     inside: Option<Vec3A>,
     depth: u32,
+    /// What asking the lights has taken, see [`Stack::boxes`].
+    boxes: u64,
     /// Whether the camera's ray passes backs: it has met one already.
     culls: bool,
 }
@@ -76,6 +79,7 @@ impl Path {
             density: None,
             inside: None,
             depth: 0,
+            boxes: 0,
             culls: false,
         }
     }
@@ -229,9 +233,15 @@ impl World {
         }
         let is_last = path.depth == settings.max_depth;
         let mut scattered = Vec3A::ZERO;
-        let asked = self.ask_lights(moment, &point, settings, stack, probe, |arriving| {
+        let before = stack.boxes;
+        let until = before.saturating_add(self.efforts.path.saturating_sub(path.boxes));
+        let then = Then::Draw(path.numbers.light(path.depth));
+        let patience = Patience { stride: 1, until, then };
+        let asking = (&mut *stack, patience);
+        let asked = self.ask_lights(moment, &point, settings, asking, probe, |arriving| {
             scattered += bsdf.scattered(arriving.to_light) * arriving.irradiance;
         });
+        path.boxes += stack.boxes - before;
         let [to_follow, to_light] = path.numbers.at_surface(path.depth);
         if !self.emitters.is_empty() {
             scattered += self.ask_emitters(moment, &point, &bsdf, is_last, to_light, stack);

@@ -362,7 +362,15 @@ impl<K: Kernel, S: Stops, const ANY: bool> Leaves for Instances<'_, K, S, ANY> {
                     sieve,
                     kernel: PhantomData,
                 };
-                walk::<K, ANY>(&blas.nodes, &SlabRay::new(&ray), best, stack, &mut triangles)
+                let before = stack.boxes;
+                let found =
+                    walk::<K, ANY>(&blas.nodes, &SlabRay::new(&ray), best, stack, &mut triangles);
+                if let Shape::Deforming(index) = placed.shape {
+                    // How its tree is made depends on how it has moved before.
+                    let price = self.targets.trees.deforming[index as usize].price;
+                    stack.boxes = before + u64::from(price);
+                }
+                found
             }
             Some(_) => false,
         }

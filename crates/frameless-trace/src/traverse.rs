@@ -20,6 +20,9 @@ pub(crate) struct Stack {
     /// Per entry of a packet: eight times its parent's index, plus its slot there.
     from: [u32; ENTRIES],
     length: usize,
+    /// Nodes and leaves that rays have come to that were walked alone, and as many as take the time of what else they met. Whatever is done with
+    /// a ray, and by whichever instructions, that is the same number.
+    pub(crate) boxes: u64,
     /// Of rays that look for what is nearest, and of those that look for anything.
     pub(crate) worth: [Worth; 2],
     /// For rays that are walked by turns: those that are, and their memory.
@@ -59,6 +62,7 @@ impl Stack {
             entries: [Entry::ROOT; ENTRIES],
             from: [0; ENTRIES],
             length: 0,
+            boxes: 0,
             worth: [Worth::default(); 2],
             alone: Vec::new(),
             ways: Ways::default(),
@@ -141,7 +145,9 @@ pub(crate) fn walk<K: Kernel, const ANY: bool>(
     let base = stack.length;
     let mut current = Child::ROOT;
     let mut found = false;
+    let mut boxes = 0;
     loop {
+        boxes += 1;
         if current.is_leaf() {
             // What its second line holds is wanted at once, but found only by the first.
             K::fetch(leaves.words().as_ptr().wrapping_add(current.place()).cast());
@@ -149,6 +155,7 @@ pub(crate) fn walk<K: Kernel, const ANY: bool>(
                 found = true;
                 if ANY {
                     stack.length = base;
+                    stack.boxes += boxes;
                     return true;
                 }
             }
@@ -162,6 +169,7 @@ pub(crate) fn walk<K: Kernel, const ANY: bool>(
         }
         loop {
             if stack.length == base {
+                stack.boxes += boxes;
                 return found;
             }
             let entry = stack.pop();

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use crate::build::{Blas, OneMesh};
 use crate::deforming::Deforming;
 use crate::emitters::Emitters;
+use crate::forecast::Efforts;
 use crate::holes::may_have_holes;
 use crate::images::Mirrors;
 use crate::kernel::Isa;
@@ -44,6 +45,8 @@ pub struct World {
     /// The scene's environment.
     pub(crate) surroundings: Option<Surroundings>,
     pub(crate) isa: Isa,
+    /// What samples may take.
+    pub(crate) efforts: Efforts,
     /// Tells the moments of this world from those of others.
     pub(crate) id: u64,
 }
@@ -87,6 +90,7 @@ impl World {
             is_plain: scene.materials.iter().map(|m| is_plain(&scene, m)).collect(),
             scene,
             isa,
+            efforts: Efforts::default(),
             id: WORLDS.fetch_add(1, Ordering::Relaxed),
         }
     }

@@ -574,3 +574,68 @@ fn fifteen_hundred_masked_sheets_behind_each_other_are_drawn() {
     document["scenes"][0]["nodes"] = json!((0..1_500).collect::<Vec<_>>());
     is_drawn("masked sheets", &(document, bin));
 }
+
+/// Triangles from these corners; with a camera if that is somewhere else than the origin.
+fn of_corners(corners: &[[f32; 3]], instances: &[Value]) -> (Value, Vec<u8>) {
+    let (mut document, mut bin) = triangle();
+    let places = add_numbers(&mut document, &mut bin, "VEC3", corners.as_flattened());
+    document["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = json!(places);
+    document["nodes"] = instances.into();
+    document["scenes"][0]["nodes"] = json!((0..instances.len()).collect::<Vec<_>>());
+    (document, bin)
+}
+
+/// Numbers in [0, 1).
+fn numbers() -> impl FnMut() -> f32 {
+    let mut word = 1u32;
+    move || {
+        word = word.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (word >> 8) as f32 / 16_777_216.0
+    }
+}
+
+/// Twelve seconds for a picture: over all directions a ray asks a thousand boxes, along the slab six thousand.
+#[test]
+fn a_slab_of_needles_that_is_seen_along_itself_is_refused() {
+    let mut number = numbers();
+    let mut needle = || {
+        let [x, y, z] = [100.0 * number() - 50.0, number(), 100.0 * number() - 50.0];
+        let [a, b, c] = [number(), number(), number()].map(|side| (side - 0.5).signum() * 0.5);
+        let end = |way: f32, w: f32| [x + way * a + w, y + way * b, z + way * c - w];
+        [end(-1.0, -5e-4), end(-1.0, 5e-4), end(1.0, 0.0)]
+    };
+    let corners: Vec<_> = (0..5_000).flat_map(|_| needle()).collect();
+    let slab = |yfov: f32| {
+        let mut nodes: Vec<Value> = (0..60u8)
+            .map(|k| f32::from(k).sin_cos())
+            .map(|(sine, cosine)| json!({"mesh": 0, "rotation": [0, sine, 0, cosine]}))
+            .collect();
+        nodes.push(json!({"camera": 0, "translation": [0, 0.5, 70]}));
+        let (mut document, bin) = of_corners(&corners, &nodes);
+        document["cameras"] =
+            json!([{"type": "perspective", "perspective": {"yfov": yfov, "znear": 0.1}}]);
+        (document, bin)
+    };
+    is_refused("a slab", &slab(0.02), "--max-overlap");
+    // Of which most of the picture sees nothing.
+    is_drawn("a slab in a wide picture", &slab(2.8));
+}
+
+/// Refused for what lies on a line through all of them, though most of the picture stops at the first or sees none.
+#[test]
+fn a_bundle_of_long_cables_is_drawn() {
+    let mut number = numbers();
+    let turn = glam::Quat::from_xyzw(0.27, 0.27, 0.0, 0.924).normalize();
+    let mut cable = || {
+        let [a, b] =
+            [-5.0f32, 5.0].map(|z| glam::Vec3::new(2.0 * number() - 1.0, 2.0 * number() - 1.0, z));
+        let (e, f) = (0.01 * glam::Vec3::X, 0.01 * glam::Vec3::Y);
+        let sides = [(e, f), (f, -e), (-e, -f), (-f, e)];
+        sides.into_iter().flat_map(move |(u, v)| [a + u, a + v, b + v, a + u, b + v, b + u])
+    };
+    let corners: Vec<_> = (0..2_000)
+        .flat_map(|_| cable().map(|corner| corner.to_array()).collect::<Vec<_>>())
+        .collect();
+    let nodes = [json!({"mesh": 0, "rotation": turn.to_array()})];
+    is_drawn("cables", &of_corners(&corners, &nodes));
+}

@@ -91,8 +91,8 @@ pub(crate) struct LimitArgs {
     #[arg(long, value_name = "N", default_value_t = Limits::default().lights)]
     max_lights: u64,
 
-    /// Surfaces on top of each other, or nearly so: boxes of the tree over all triangles that a ray has to ask; as often as it
-    /// asks, a picture takes long
+    /// Surfaces on top of each other, or nearly so: boxes of the tree over all triangles that a ray has to ask, twice as many if
+    /// it stopped nowhere; as often as it asks, a picture takes long
     #[arg(long, value_name = "N", default_value_t = Limits::default().overlap)]
     max_overlap: u64,
 }

@@ -30,8 +30,9 @@ pub struct Limits {
     pub instances: u64,
     /// Punctual lights at nodes: `direct` looks at every one from every point.
     pub lights: u64,
-    /// Boxes of nodes and leaves that a ray meets, on average, where surfaces lie on top of each other: a picture of 512×384 takes
-    /// seconds. Whoever prepares the scene for rays counts them.
+    /// Boxes of nodes and leaves that a ray meets, on average, where surfaces lie on top of each other: on a line twice as many, and two
+    /// thirds until a ray that is seen and one to a light have hit something; a picture of 512×384 takes seconds. Whoever prepares the scene for rays
+    /// counts them.
     pub overlap: u64,
     /// Keys of all animation channels together.
     pub keyframes: u64,
@@ -297,6 +298,7 @@ pub(super) fn flag_of(what: &str) -> Option<&'static str> {
         "instances" | "instances from few bytes of file" => "--max-instances",
         "lights" => "--max-lights",
         "boxes of surfaces for the rays to all lights"
+        | "boxes of surfaces for what is seen of one pixel"
         | "boxes of surfaces on top of each other for a ray"
         | "boxes of surfaces on top of each other for a ray, as things move" => "--max-overlap",
         _ => return None,
