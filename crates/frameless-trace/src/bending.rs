@@ -300,3 +300,14 @@ fn a_ray_that_enters_what_deforms_takes_its_price() {
     }
     assert!(entered > 50, "{entered}");
 }
+
+#[test]
+fn a_crowd_has_its_triangles_once() {
+    let mut scene = bending_ball();
+    let (first, deformation) = (scene.instances[0], scene.deformations[0].clone());
+    scene.instances.push(first);
+    scene.deformations.push(Deformation { instance: 1, ..deformation });
+    let world = World::new(Arc::new(scene));
+    let [one, other] = [0, 1].map(|index| world.deforming[index].vertices().triangles);
+    assert!(Arc::ptr_eq(&one, &other));
+}

@@ -1,6 +1,6 @@
 //! Instances that deform: their vertices at one moment, and the BVH over them.
 
-use std::sync::{Arc, Once};
+use std::sync::{Arc, Once, OnceLock};
 
 use frameless::Deformed as Vertices;
 use frameless_scene::{Deformed, Geometry, Mesh, Scene, State};
@@ -26,12 +26,17 @@ impl Deforming {
     /// All of the scene's, at time 0.
     pub(crate) fn all(scene: &Scene) -> Vec<Deforming> {
         let (state, is_said) = (scene.state_at(0.0), Arc::new(Once::new()));
+        // Per geometry: a crowd has one.
+        let triangles = vec![OnceLock::new(); scene.geometries.len()];
         let all = (0..scene.deformations.len()).into_par_iter().map(|index| {
             let mut now = Deformed::default();
             scene.deform(index, &state, &mut now);
             let mesh = mesh(scene, index);
             let tree = Flexible::new(mesh, now.positions());
-            let triangles = Arc::new(mesh.triangles.clone());
+            let instance = scene.instances[scene.deformations[index].instance as usize];
+            let triangles = triangles[instance.geometry as usize]
+                .get_or_init(|| Arc::new(mesh.triangles.clone()))
+                .clone();
             let price = expected_boxes(&tree.blas);
             Deforming { now, tree, price, triangles, is_said: is_said.clone() }
         });

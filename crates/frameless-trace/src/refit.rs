@@ -21,7 +21,7 @@ const WORST: f32 = 1.8;
 #[derive(Clone, Debug)]
 pub(crate) struct Flexible {
     pub(crate) blas: Blas,
-    /// For each word of the leaves that is a vertex's x: which vertex. The others say nothing.
+    /// Which vertices the leaves have, from the last node to the first.
     vertices: Vec<u32>,
     /// Per node: the box around it.
     boxes: Vec<Bounds>,
@@ -58,18 +58,20 @@ impl Flexible {
     /// A tree for the mesh with its vertices at `positions`.
     pub(crate) fn new(mesh: &Mesh, positions: &[Vec3A]) -> Flexible {
         let blas = Blas::new(&Bent { mesh, positions });
-        let mut vertices = vec![u32::MAX; blas.leaves.len()];
-        let children = blas.nodes.iter().flat_map(|node| node.child);
+        let mut vertices = Vec::new();
+        let children = blas.nodes.iter().rev().flat_map(|node| node.child);
         for child in children.filter(|&child| child != Node::UNUSED && child.is_leaf()) {
             let leaf = Leaf::at(&blas.leaves, child.place());
-            let (first, _) = vertices_at(&blas.leaves, child.place());
+            let (begin, (_, count)) = (vertices.len(), vertices_at(&blas.leaves, child.place()));
+            vertices.resize(begin + count, u32::MAX);
             for lane in 0..leaf.triangles() {
                 let triangle = mesh.triangles[leaf.triangle(lane) as usize];
                 for (corner, vertex) in triangle.into_iter().enumerate() {
-                    vertices[first + leaf.vertex_of(lane, corner)] = vertex;
+                    vertices[begin + leaf.vertex_of(lane, corner)] = vertex;
                 }
             }
         }
+        vertices.shrink_to_fit();
         let boxes = vec![NOTHING; blas.nodes.len()];
         let mut flexible = Flexible { blas, vertices, boxes, cost_built: 0.0, is_whole: true };
         flexible.cost_built = flexible.refit(positions);
@@ -97,7 +99,7 @@ impl Flexible {
     #[inline(always)]
     fn fit_boxes(&mut self, positions: &[Vec3A], is_sane: impl Fn(&Vec3A) -> bool) -> f32 {
         let Flexible { blas: Blas { nodes, leaves, bounds }, vertices, boxes, .. } = self;
-        let mut work = 0.0;
+        let (mut work, mut vertices) = (0.0, &vertices[..]);
         for (index, node) in nodes.iter_mut().enumerate().rev() {
             let mut inside = [NOTHING; 8];
             for (child, inside) in node.child.iter().zip(&mut inside) {
@@ -105,7 +107,7 @@ impl Flexible {
                     continue;
                 }
                 *inside = match child.is_leaf() {
-                    true => move_leaf(leaves, vertices, *child, positions, &is_sane),
+                    true => move_leaf(leaves, &mut vertices, *child, positions, &is_sane),
                     false => boxes[child.node()],
                 };
                 work += half_area(*inside);
@@ -129,11 +131,11 @@ fn is_sane(position: &Vec3A) -> bool {
     position.abs().cmplt(Vec3A::splat(FARTHEST_M)).all()
 }
 
-/// Moves a leaf's vertices; returns the box around those that are sane. The others become NaN, so that no ray meets their triangles.
+/// Moves a leaf's vertices, which are the next ones; returns the box around those that are sane. The others become NaN, so that no ray meets their triangles.
 #[inline(always)]
 fn move_leaf(
     leaves: &mut [u32],
-    vertices: &[u32],
+    vertices: &mut &[u32],
     leaf: Child,
     positions: &[Vec3A],
     is_sane: impl Fn(&Vec3A) -> bool,
@@ -141,7 +143,9 @@ fn move_leaf(
     let (first, count) = vertices_at(leaves, leaf.place());
     let mut around = NOTHING;
     let words = &mut leaves[first..first + 3 * count];
-    for (k, &vertex) in vertices[first..first + count].iter().enumerate() {
+    let (these, rest) = vertices.split_at(count);
+    *vertices = rest;
+    for (k, &vertex) in these.iter().enumerate() {
         let mut position = positions[vertex as usize];
         if is_sane(&position) {
             around = union(around, [position; 2]);
