@@ -8,6 +8,7 @@ mod deform;
 mod environment;
 mod gltf;
 mod material;
+mod radiance;
 mod runs;
 mod scene;
 mod state;
@@ -18,7 +19,7 @@ pub use animation::{AfterEnd, Animation, Channel, Interpolation, Target, Value, 
 pub use bounds::Bounds;
 pub use builtin::{BUILTIN_DESCRIPTIONS, BUILTIN_NAMES, builtin};
 pub use deform::{Deformed, FARTHEST_M};
-pub use environment::{Environment, load_environment};
+pub use environment::{Environment, Texels, load_environment};
 pub use gltf::{
     AnimationChoice, Choice, Limits, LoadError, Pick, Place, Problem, load, load_bytes, load_chosen,
 };

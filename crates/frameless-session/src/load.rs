@@ -162,7 +162,7 @@ mod tests {
             name: "grey".to_owned(),
             width: 1,
             height: 1,
-            texels: Arc::new(vec![[0.5; 3]]),
+            texels: Arc::new(frameless_scene::Texels::Linear(vec![[0.5; 3]])),
             rotation_rad: 0.0,
             strength: 1.0,
         };

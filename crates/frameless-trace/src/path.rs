@@ -438,7 +438,7 @@ mod tests {
         scenes::add(&mut scene, Geometry::Sphere { material: 0 }, scenes::at(0.0, 0.0, 0.0));
         let met = mean(scene.clone(), 1000, 64);
         assert!((met - 1.0).abs().max_element() < 1e-4, "{met}");
-        let texels = Arc::new(vec![[1.0; 3]; 32]);
+        let texels = Arc::new(frameless_scene::Texels::Linear(vec![[1.0; 3]; 32]));
         let (width, height, rotation_rad, strength) = (8, 4, 0.0, 1.0);
         let name = String::new();
         scene.environment = Some(frameless_scene::Environment {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use frameless::{Request, Size};
 use frameless_scene::{
     AlphaMode, Environment, Filter, Geometry, Image, Layers, Material, Mesh, Minify, Projection,
-    Scene, Texture, TextureRef, Transform, TriangleMaterials, View, Volume, Wrap, look_at,
+    Scene, Texels, Texture, TextureRef, Transform, TriangleMaterials, View, Volume, Wrap, look_at,
 };
 use glam::{Quat, Vec2, Vec3, Vec4};
 
@@ -299,7 +299,7 @@ fn a_block_of_glass_displaces_what_is_behind_it() {
 
 fn environment(width: u32, height: u32, texel: impl Fn(u32, u32) -> f32) -> Environment {
     let texels = (0..width * height).map(|i| [texel(i % width, i / width); 3]).collect();
-    let (name, texels) = (String::new(), Arc::new(texels));
+    let (name, texels) = (String::new(), Arc::new(Texels::Linear(texels)));
     Environment { name, width, height, texels, rotation_rad: 0.0, strength: 1.0 }
 }
 

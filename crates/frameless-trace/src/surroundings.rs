@@ -15,6 +15,7 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 use frameless_scene::Environment;
 use glam::{DVec3, Vec3, Vec3A};
+use rayon::prelude::*;
 
 /// Coefficients of spherical harmonics up to order 2.
 const HARMONICS: usize = 9;
@@ -43,16 +44,15 @@ pub(crate) struct FromAfar {
 impl Surroundings {
     pub(crate) fn new(environment: &Environment) -> Surroundings {
         let (width, height) = (environment.width as usize, environment.height as usize);
-        let mut rows = Vec::with_capacity(height);
-        let mut columns = Vec::with_capacity(width * height);
-        for row in 0..height {
-            let weights = (0..width).map(|column| weight(environment, column, row));
-            rows.push(cumulate(weights, &mut columns) * f64::from(band(row, height)));
-        }
-        let mut cumulated = Vec::with_capacity(height);
-        cumulate(rows.into_iter(), &mut cumulated);
+        let mut columns = vec![0.0; width * height];
+        let weights = columns.par_chunks_mut(width).enumerate().map(|(row, columns)| {
+            cumulate(&weights(environment, row), columns) * f64::from(band(row, height))
+        });
+        let weights: Vec<f64> = weights.collect();
+        let mut rows = vec![0.0; height];
+        cumulate(&weights, &mut rows);
         let irradiance = project(environment);
-        Surroundings { environment: environment.clone(), rows: cumulated, columns, irradiance }
+        Surroundings { environment: environment.clone(), rows, columns, irradiance }
     }
 
     /// From a direction of unit length.
@@ -141,7 +141,7 @@ impl Surroundings {
 fn texel(environment: &Environment, column: i64, row: i64) -> Vec3A {
     let (width, height) = (i64::from(environment.width), i64::from(environment.height));
     let place = row.clamp(0, height - 1) * width + column.rem_euclid(width);
-    environment.texels[place as usize].into()
+    environment.texels.at(place as usize).into()
 }
 
 /// Solid angle of a row over that of a lune of the same width: cosθ above minus cosθ below.
@@ -150,24 +150,30 @@ fn band(row: usize, height: usize) -> f32 {
     (cos(row) - cos(row + 1)) as f32
 }
 
-/// Mean luminance around a texel.
-fn weight(environment: &Environment, column: usize, row: usize) -> f64 {
+/// Mean luminance around each texel of a row.
+fn weights(environment: &Environment, row: usize) -> Vec<f64> {
     const LUMINANCE: Vec3A = Vec3A::new(0.2126, 0.7152, 0.0722);
-    let around = (-1..=1).flat_map(|j| (-1..=1).map(move |i| (i, j)));
-    let texels = around.map(|(i, j)| texel(environment, column as i64 + i, row as i64 + j));
-    texels.map(|texel| f64::from(texel.dot(LUMINANCE)) / 9.0).sum()
+    let width = environment.width as usize;
+    let around = [-1, 0, 1].map(|j| -> Vec<f64> {
+        let texels = (0..width).map(|column| texel(environment, column as i64, row as i64 + j));
+        texels.map(|texel| f64::from(texel.dot(LUMINANCE)) / 9.0).collect()
+    });
+    let weights = (0..width).map(|column| {
+        let columns = [(column + width - 1) % width, column, (column + 1) % width];
+        around.iter().flat_map(|row| columns.map(|column| row[column])).sum()
+    });
+    weights.collect()
 }
 
-/// Appends the sums so far over the sum of all, and returns that. Evenly, if it is 0.
-fn cumulate(weights: impl Iterator<Item = f64> + Clone, cumulated: &mut Vec<f32>) -> f64 {
-    let total: f64 = weights.clone().sum();
-    let count = weights.clone().count() as f64;
+/// Fills in the sums so far over the sum of all, and returns that. Evenly, if it is 0.
+fn cumulate(weights: &[f64], cumulated: &mut [f32]) -> f64 {
+    let (total, count): (f64, _) = (weights.iter().sum(), weights.len() as f64);
     let mut sum = 0.0;
-    cumulated.extend(weights.enumerate().map(|(k, weight)| {
+    for (k, (&weight, cumulated)) in weights.iter().zip(&mut *cumulated).enumerate() {
         sum += weight;
         let part = if total > 0.0 { sum / total } else { (k + 1) as f64 / count };
-        part as f32
-    }));
+        *cumulated = part as f32;
+    }
     if let Some(last) = cumulated.last_mut() {
         *last = 1.0;
     }
@@ -186,12 +192,17 @@ fn draw(cumulated: &[f32], number: f32) -> Option<(usize, f32)> {
 fn project(environment: &Environment) -> [Vec3A; HARMONICS] {
     let (width, height) = (environment.width as usize, environment.height as usize);
     let mut sums = [DVec3::ZERO; HARMONICS];
+    let azimuths = (0..width).map(|column| {
+        let phi = std::f64::consts::TAU * ((column as f64 + 0.5) / width as f64 - 0.5);
+        [phi.cos(), phi.sin()]
+    });
+    let azimuths: Vec<[f64; 2]> = azimuths.collect();
     for row in 0..height {
         let theta = std::f64::consts::PI * (row as f64 + 0.5) / height as f64;
+        let (sin, cos) = (theta.sin(), theta.cos());
         let solid_angle = f64::from(band(row, height)) * std::f64::consts::TAU / width as f64;
-        for column in 0..width {
-            let phi = std::f64::consts::TAU * ((column as f64 + 0.5) / width as f64 - 0.5);
-            let direction = [theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin()];
+        for (column, [x, z]) in azimuths.iter().enumerate() {
+            let direction = [sin * x, cos, sin * z];
             let light = texel(environment, column as i64, row as i64);
             let light = Vec3::from(light).as_dvec3() * solid_angle;
             for (sum, value) in sums.iter_mut().zip(harmonics(direction.map(|c| c as f32))) {
@@ -225,6 +236,7 @@ fn harmonics([x, y, z]: [f32; 3]) -> [f32; HARMONICS] {
 mod tests {
     use super::*;
     use frameless::Rng;
+    use frameless_scene::Texels;
     use std::sync::Arc;
 
     fn environment(width: u32, height: u32, texel: impl Fn(u32, u32) -> f32) -> Environment {
@@ -233,7 +245,7 @@ mod tests {
             name: String::new(),
             width,
             height,
-            texels: Arc::new(texels),
+            texels: Arc::new(Texels::Linear(texels)),
             rotation_rad: 0.0,
             strength: 1.0,
         }

@@ -254,21 +254,21 @@ fn image_bytes(pixels: u64) -> u64 {
     pixels.saturating_mul(4 * 5) / 3
 }
 
-/// Refuses a picture of what is far away that is larger than allowed: three numbers per texel, and two more to draw from it.
+/// Refuses a picture of what is far away that is larger than allowed: each texel has four bytes, and a number to draw it by.
 pub(crate) fn check_environment_size(
     width: u32,
     height: u32,
-    encoded_bytes: usize,
+    encoded_bytes: u64,
     limits: &Limits,
 ) -> Result<(), Problem> {
-    const BYTES_PER_TEXEL: u64 = 5 * 4;
+    const BYTES_PER_TEXEL: u64 = 2 * 4;
     /// Without compression each has four bytes, and photographs little less with it.
     const PIXELS_PER_BYTE: u64 = 4;
     /// Of all texels, those that may come from next to nothing: by default 8 million, a second's work.
     const THIN_SHARE: u64 = 64;
     let pixels = u64::from(width) * u64::from(height);
     let bytes = pixels.saturating_mul(BYTES_PER_TEXEL);
-    let thin = pixels.saturating_sub(PIXELS_PER_BYTE.saturating_mul(encoded_bytes as u64));
+    let thin = pixels.saturating_sub(PIXELS_PER_BYTE.saturating_mul(encoded_bytes));
     let thin_limit = limits.total_pixels / THIN_SHARE;
     within(pixels, limits.image_pixels, "pixels in one image", "")
         .and_then(|()| {

@@ -62,20 +62,32 @@ pub fn load_bytes(
 }
 
 /// The bytes of a plain file within the limits.
-pub(crate) fn read_whole(path: &Path, limits: &Limits) -> Result<Vec<u8>, LoadError> {
-    read(path, limits).map_err(|fault| fault.in_file(&path.display().to_string()))
+fn read_whole(path: &Path, limits: &Limits) -> Result<Vec<u8>, LoadError> {
+    let (file, _) = open_plain(path, limits)?;
+    read_file((file, path), "", &mut Budget::new(limits))
+        .map_err(|fault| whole(fault.problem).in_file(&path.display().to_string()))
 }
 
-fn read(path: &Path, limits: &Limits) -> Result<Vec<u8>, Fault> {
-    let whole = |problem| Fault { place: Place::Whole, problem };
-    let metadata = path.metadata().map_err(|error| whole(Problem::Io(error)))?;
-    if !metadata.is_file() {
-        // Opening a pipe would wait for its other end.
-        let wanted = "a plain file".to_owned();
-        return Err(whole(Problem::Unexpected { wanted, came: "something else".to_owned() }));
-    }
-    let file = File::open(path).map_err(|error| whole(Problem::Io(error)))?;
-    read_file((file, path), "", &mut Budget::new(limits)).map_err(|fault| whole(fault.problem))
+/// A plain file within the limits, and how many bytes it has.
+pub(crate) fn open_plain(path: &Path, limits: &Limits) -> Result<(File, u64), LoadError> {
+    let open = || {
+        let metadata = path.metadata().map_err(|error| whole(Problem::Io(error)))?;
+        if !metadata.is_file() {
+            // Opening a pipe would wait for its other end.
+            let wanted = "a plain file".to_owned();
+            return Err(whole(Problem::Unexpected { wanted, came: "something else".to_owned() }));
+        }
+        let bytes = metadata.len();
+        within(bytes, limits.file_bytes, "bytes of file", "")
+            .map_err(|fault| whole(fault.problem))?;
+        let file = File::open(path).map_err(|error| whole(Problem::Io(error)))?;
+        Ok((file, bytes))
+    };
+    open().map_err(|fault: Fault| fault.in_file(&path.display().to_string()))
+}
+
+fn whole(problem: Problem) -> Fault {
+    Fault { place: Place::Whole, problem }
 }
 
 fn from_bytes(

@@ -61,4 +61,4 @@ pub use load::{load, load_bytes, load_chosen};
 pub(crate) use defaults::NO_LIGHT;
 pub(crate) use error::one_line;
 pub(crate) use limits::check_environment_size;
-pub(crate) use load::read_whole;
+pub(crate) use load::open_plain;

@@ -1,7 +1,7 @@
 //! Materials, textures, images and extensions.
 
 use frameless_scene::{
-    AlphaMode, Environment, Filter, Limits, Minify, Scene, TextureRef, Wrap, load_bytes,
+    AlphaMode, Environment, Filter, Limits, Minify, Scene, Texels, TextureRef, Wrap, load_bytes,
 };
 use glam::{Vec2, Vec3, Vec4};
 use serde_json::{Value, json};
@@ -187,7 +187,7 @@ fn an_environment_takes_the_place_of_light_that_was_added() {
     )
     .load();
     assert!(scene.has_added_light && scene.lights.len() == 1);
-    let texels = std::sync::Arc::new(vec![[1.0; 3]; 2]);
+    let texels = std::sync::Arc::new(Texels::Linear(vec![[1.0; 3]; 2]));
     let environment = Environment {
         name: "two.hdr".to_owned(),
         width: 2,
