@@ -5,8 +5,10 @@ mod bounds;
 mod builtin;
 mod check;
 mod deform;
+mod encoding;
 mod environment;
 mod gltf;
+mod half;
 mod material;
 mod radiance;
 mod runs;
@@ -19,6 +21,7 @@ pub use animation::{AfterEnd, Animation, Channel, Interpolation, Target, Value, 
 pub use bounds::Bounds;
 pub use builtin::{BUILTIN_DESCRIPTIONS, BUILTIN_NAMES, builtin};
 pub use deform::{Deformed, FARTHEST_M};
+pub use encoding::Encoding;
 pub use environment::{Environment, Texels, load_environment};
 pub use gltf::{
     AnimationChoice, Choice, Limits, LoadError, Pick, Place, Problem, load, load_bytes, load_chosen,

@@ -60,7 +60,20 @@ pub(super) fn decode(picture: &[u8], limits: &image::Limits) -> Result<Decoded, 
     // In place: a copy would be the largest thing in memory.
     let rgba = bytemuck::try_cast_vec(decoded.into_rgba8().into_raw());
     let rgba = rgba.map_err(|(error, _)| one_line(&error))?;
-    Ok(Decoded { image: Image { width, height, rgba }, damage: told.or(wrong) })
+    let image = without_repetition(Image { width, height, rgba });
+    Ok(Decoded { image, damage: told.or(wrong) })
+}
+
+/// A picture all of one colour as one texel, which looks the same from everywhere.
+fn without_repetition(image: Image) -> Image {
+    /// Texels of pictures that are not worth it.
+    const FEW: usize = 64 * 64;
+    match image.rgba.split_first() {
+        Some((&first, rest)) if rest.len() >= FEW && rest.iter().all(|&texel| texel == first) => {
+            Image { width: 1, height: 1, rgba: vec![first] }
+        }
+        _ => image,
+    }
 }
 
 fn said(error: impl Display) -> String {
@@ -236,6 +249,22 @@ mod tests {
         let cut = header(true, &[0x11; 4], 1);
         for length in 0..cut.len() {
             let _ = working_bytes(&cut[..length], [u32::MAX; 2], u64::MAX);
+        }
+    }
+
+    #[test]
+    fn what_is_all_of_one_colour_is_one_texel() {
+        let flat = |side: u32| Image {
+            width: side,
+            height: side,
+            rgba: vec![[1, 2, 3, 4]; (side * side) as usize],
+        };
+        assert_eq!(without_repetition(flat(64)), flat(64));
+        assert_eq!(without_repetition(flat(65)), flat(1));
+        for texel in [0, 1, 4224] {
+            let mut other = flat(65);
+            other.rgba[texel][3] = 5;
+            assert_eq!(without_repetition(other.clone()), other);
         }
     }
 

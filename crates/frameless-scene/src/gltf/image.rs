@@ -1,7 +1,7 @@
 //! Pictures in the file: PNG, JPEG or WebP, told apart by their first bytes.
 //!
 //! A picture that cannot be decoded does not stop the scene: a magenta and grey checker stands in for it, which nobody takes
-//! for the real one, and a warning names it.
+//! for the real one, and a warning names it. One for which there is no room is kept at half its size, or less ([`super::room`]).
 
 use std::path::Path;
 
@@ -74,28 +74,29 @@ impl<'a> FileImage<'a> {
             }
         };
         let limits = decoder_limits(&document.budget);
-        let encoded = Encoded { found, pointer: pointer.to_owned(), limits };
-        let bytes = encoded.found.get(&document.views);
+        let bytes = found.get(&document.views);
         document.budget.look_through(pointer, bytes.len())?;
         let picture = picture(bytes);
         if format_of(&picture).is_none() {
             return Err(Fault::at(pointer, "a PNG, JPEG or WebP image", "other bytes"));
         }
-        let decoder = lenient(&picture, &encoded.limits);
+        let decoder = lenient(&picture, &limits);
         let decoder = decoder.map_err(|error| Fault::at(pointer, "an image", error))?;
         let ((width, height), decoded_bytes) = (decoder.dimensions(), decoder.total_bytes());
         drop(decoder);
+        let working_bytes = working_bytes(&picture, [width, height], decoded_bytes);
         let size = PictureSize {
             pixels: [width, height],
             decoded_bytes,
-            working_bytes: working_bytes(&picture, [width, height], decoded_bytes),
+            working_bytes,
             encoded_bytes: picture.len(),
         };
         document.budget.add_image(pointer, &size)?;
         if width == 0 || height == 0 {
             return Err(Fault::at(pointer, "an image", "no pixels"));
         }
-        Ok(encoded)
+        drop(picture);
+        Ok(Encoded { found, pointer: pointer.to_owned(), limits, working_bytes })
     }
 
     /// Says what is wrong with the file of a picture that is drawn all the same.
@@ -103,6 +104,12 @@ impl<'a> FileImage<'a> {
         let what = "images whose files are damaged are drawn as far as they can be read";
         let called = self.json.called("image");
         document.warnings.about(what, format!("{called} ({damage})"));
+    }
+
+    /// Says that it is smaller than in the file, and why.
+    pub(super) fn warn_of_size(&self, fault: &Fault, document: &mut Document<'_>) {
+        let what = format!("images are kept at half their size or less, being {}", fault.problem);
+        document.warnings.about(what, self.json.called("image"));
     }
 
     /// The checker, with a warning that says why.
@@ -120,6 +127,8 @@ pub(super) struct Encoded {
     found: Found,
     pointer: String,
     limits: image::Limits,
+    /// What is in memory while it is decoded.
+    pub(super) working_bytes: u64,
 }
 
 #[derive(Debug)]

@@ -76,7 +76,6 @@ pub(super) struct Budget {
     triangles: u64,
     vertices: u64,
     pixels: u64,
-    thin_pixels: u64,
     keyframes: u64,
     /// Files that have been counted.
     files: HashSet<PathBuf>,
@@ -99,7 +98,6 @@ impl Budget {
             triangles: 0,
             vertices: 0,
             pixels: 0,
-            thin_pixels: 0,
             keyframes: 0,
             files: HashSet::new(),
             picture_bytes: 0,
@@ -133,11 +131,9 @@ impl Budget {
 
     /// What may be made of nothing, and beyond that of files of this size.
     fn made(&self) -> [u64; 2] {
-        /// What is compressed best (EXT_meshopt_compression, quantised to 8 bits) is made into about 20 times as much.
-        const PER_BYTE: u64 = 32;
         // Whoever wants less than usual of all does not want less of small files.
         let most = self.limits.decoded_bytes.max(Limits::default().decoded_bytes);
-        [most / MADE_SHARE, PER_BYTE.saturating_mul(self.file_bytes)]
+        [most / MADE_SHARE, MADE_PER_BYTE.saturating_mul(self.file_bytes)]
     }
 
     /// The same of an accessor without data, whose elements are zeros until a sparse one replaces some: morph targets that move little.
@@ -196,13 +192,8 @@ impl Budget {
             .map_err(|fault| fault.telling(|came| (came - of_files).saturating_mul(SHARE)))
     }
 
-    /// A picture is about to be decoded.
+    /// A picture is there: refuses one that is too large to be decoded.
     pub(super) fn add_image(&mut self, pointer: &str, size: &PictureSize) -> Result<(), Fault> {
-        /// Drawings of a few flat colours have 10 to 50, a single colour a thousand.
-        const PIXELS_PER_BYTE: u64 = 64;
-        /// Of all texels, those that may come from next to nothing: by default 62 million, a second's work and 400 MB. A file of
-        /// a few kilobytes could take as much as the largest scenes otherwise.
-        const THIN_SHARE: u64 = 8;
         /// Processors of graphics take 16,384 or twice as many; every column and row takes memory of its own when smaller copies are made.
         const SIDE: u64 = 65_536;
         /// Of what is in memory while a pixel is decoded, so much is not worth counting: 375 MB of them all.
@@ -216,20 +207,56 @@ impl Budget {
         let told = (encoded_bytes as u64).min(self.file_bytes.saturating_sub(self.picture_bytes));
         self.picture_bytes += told;
         // Those of 16 bits per channel take as much as two.
-        let thin = pixels
-            .max(decoded_bytes / 4)
-            .max(working_bytes / BYTES_PER_PIXEL)
-            .saturating_sub(PIXELS_PER_BYTE.saturating_mul(told));
-        let thin_limit = self.limits.total_pixels / THIN_SHARE;
-        spend(&mut self.thin_pixels, thin, thin_limit, "pixels in images of few bytes", pointer)
-            .map_err(|fault| fault.telling(|came| came.saturating_mul(THIN_SHARE)))?;
+        let taken = pixels.max(decoded_bytes / 4).max(working_bytes / BYTES_PER_PIXEL);
+        self.check_thin_pixels(pointer, taken, told)?;
         spend(&mut self.pixels, pixels, self.limits.total_pixels, "pixels in all images", pointer)?;
         let limit = self.limits.decoded_bytes.saturating_sub(self.bytes);
-        let bytes = image_bytes(pixels).max(working_bytes);
-        spend(&mut self.image_bytes, bytes, limit, "decoded bytes", pointer)
+        within(working_bytes, limit, "decoded bytes", pointer)
+            .map_err(|fault| fault.telling(|came| came.saturating_add(self.bytes)))
+    }
+
+    /// Refuses so many pixels in all pictures together, as they are kept.
+    pub(super) fn check_pixels(&self, pixels: u64) -> Result<(), Fault> {
+        self.check_thin_pixels("", pixels, self.picture_bytes)?;
+        let limit = self.limits.decoded_bytes.saturating_sub(self.bytes);
+        within(image_bytes(pixels), limit, "decoded bytes", "")
+            .map_err(|fault| fault.telling(|came| came.saturating_add(self.bytes)))
+    }
+
+    fn check_thin_pixels(&self, pointer: &str, pixels: u64, bytes: u64) -> Result<(), Fault> {
+        let thin = pixels.saturating_sub(PIXELS_PER_BYTE.saturating_mul(bytes));
+        let limit = self.limits.total_pixels / THIN_SHARE;
+        within(thin, limit, "pixels in images of few bytes", pointer)
+            .map_err(|fault| fault.telling(|came| pixels.max(came.saturating_mul(THIN_SHARE))))
+    }
+
+    /// All pictures together are kept so.
+    pub(super) fn keep_pixels(&mut self, pixels: u64) {
+        self.image_bytes = image_bytes(pixels);
+    }
+
+    /// Refuses so many bytes in memory while pictures are decoded: of those that have been, and of those that are.
+    pub(super) fn check_decoders(&self, bytes: u64) -> Result<(), Fault> {
+        /// By default 437 MB: nearly twice what a picture takes that is as large as all may be together.
+        const BYTES_PER_PIXEL: u64 = 7;
+        let thin = bytes.saturating_sub(MADE_PER_BYTE.saturating_mul(self.picture_bytes));
+        let limit = self.limits.total_pixels / THIN_SHARE;
+        within(thin / BYTES_PER_PIXEL, limit, "pixels in images of few bytes", "")
+            .map_err(|fault| fault.telling(|came| came.saturating_mul(THIN_SHARE)))?;
+        let limit = self.limits.decoded_bytes.saturating_sub(self.bytes);
+        within(bytes, limit, "decoded bytes", "")
             .map_err(|fault| fault.telling(|came| came.saturating_add(self.bytes)))
     }
 }
+
+/// Pixels that a byte of a picture's file speaks for: with their smaller copies they take 32 bytes, as much as a byte speaks for elsewhere. JPEGs
+/// have 2 to 20, drawings of a few flat colours 10 to 50.
+const PIXELS_PER_BYTE: u64 = 6;
+/// Of all texels, those that may come from next to nothing: by default 62 million, a second's work and 400 MB. A file of a few kilobytes could
+/// take as much as the largest scenes otherwise.
+const THIN_SHARE: u64 = 8;
+/// Bytes that may be made of one. What is compressed best (EXT_meshopt_compression, quantised to 8 bits) is made into about 20 times as much.
+const MADE_PER_BYTE: u64 = 32;
 
 /// Of what may be decoded, the part that may be made of nothing; by default 256 MiB, or two million triangles, which take a second on two cores. Files
 /// that show a sphere in a hundred materials have half of it.
@@ -384,25 +411,30 @@ mod tests {
     #[test]
     fn images_of_few_bytes_are_limited_together() {
         let mut budget = budget_of(&Limits::default(), 2 << 20);
-        let mut add = |encoded_bytes| {
+        let add = |budget: &mut Budget, encoded_bytes| {
             let (pixels, decoded_bytes) = ([4096, 4096], 4 << 24);
             let size =
                 PictureSize { pixels, decoded_bytes, encoded_bytes, ..PictureSize::default() };
             budget.add_image("/images/0", &size)
         };
         for _ in 0..4 {
-            assert!(add(20_000).is_ok());
+            assert!(add(&mut budget, 20_000).is_ok());
         }
-        let refusal = add(20_000).unwrap_err().in_file("f").to_string();
+        assert!(budget.check_pixels(3 << 24).is_ok());
+        let refusal = budget.check_pixels(4 << 24).unwrap_err().in_file("f").to_string();
+        assert!(refusal.contains("66628864 pixels in images of few bytes"), "{refusal}");
         assert!(
-            refusal.contains("--max-texture-pixels raises it (619888640 or more)"),
+            refusal.contains("--max-texture-pixels raises it (533030912 or more)"),
             "{refusal}"
         );
         // Whoever has data for it may have more.
-        assert!(add(1 << 20).is_ok());
+        assert!(add(&mut budget, 1 << 20).is_ok());
+        assert!(budget.check_pixels(4 << 24).is_ok());
         // But not the same data again.
-        assert!(add(1 << 20).is_ok());
-        assert!(add(1 << 20).is_err());
+        assert!(add(&mut budget, 1 << 20).is_ok());
+        let most = 62_500_000 + 6 * (2 << 20);
+        assert!(budget.check_pixels(most).is_ok());
+        assert!(budget.check_pixels(most + 1).is_err());
     }
 
     #[test]
@@ -437,20 +469,17 @@ mod tests {
     #[test]
     fn images_of_16_bits_per_channel_count_twice_among_those_of_few_bytes() {
         let mut budget = budget_of(&Limits::default(), 500);
-        // Six are within the limit for 8 bits.
+        // Twice as many are within the limit for 8 bits.
         let mut add = |bytes_per_pixel: u64| {
             let size = PictureSize {
-                pixels: [3000, 3000],
-                decoded_bytes: bytes_per_pixel * 3000 * 3000,
+                pixels: [6000, 6000],
+                decoded_bytes: bytes_per_pixel * 6000 * 6000,
                 encoded_bytes: 100,
                 ..PictureSize::default()
             };
             budget.add_image("/images/0", &size)
         };
-        for _ in 0..3 {
-            assert!(add(8).is_ok());
-        }
         assert!(add(8).is_err());
-        assert!(add(4).is_err());
+        assert!(add(4).is_ok());
     }
 }

@@ -168,7 +168,7 @@ fn build(document: &mut Document<'_>, choice: &Choice) -> Result<Scene, Fault> {
     let mut textures = Textures::parse(&root, &document.views)?;
     let mut scene =
         Scene { materials: load_materials(document, &mut textures)?, ..Scene::default() };
-    scene.images = textures.decode(document);
+    scene.images = textures.decode(&scene.materials, document);
     scene.textures = textures.textures;
     let meshes = load_meshes(document, &scene.materials)?;
     scene.geometries = meshes.geometries;

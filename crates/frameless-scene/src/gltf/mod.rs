@@ -7,7 +7,7 @@
 //!
 //! | read | drawn otherwise, with a warning | ignored with a warning | refused |
 //! |---|---|---|---|
-//! | `.glb`, `.gltf`, `data:` URIs, files in its folder, EXT_meshopt_compression | images that cannot be decoded: a checker; damaged ones: as far as they go | GLB chunks of other types | a second binary chunk, other versions than 2.x, required extensions that are unknown |
+//! | `.glb`, `.gltf`, `data:` URIs, files in its folder, EXT_meshopt_compression | images that cannot be decoded: a checker; damaged ones: as far as they go; those for which there is no room: at half their size or less | GLB chunks of other types | a second binary chunk, other versions than 2.x, required extensions that are unknown |
 //! | triangles, strips, fans; indexed or not; normalised, quantised, sparse | joint weights that do not sum to 1: scaled; skins with joints elsewhere: rest shape | points, lines | indices and references that lead nowhere |
 //! | nodes with TRS or matrix, one scene, EXT_mesh_gpu_instancing | sheared matrices: without shear; matrix and TRS: the matrix; the same mesh many times in one place, the same triangle a thousand times: once | other scenes | loops, two parents |
 //! | all of a material with its textures, KHR_texture_transform, EXT_texture_webp, COLOR_0, TEXCOORD_0 to 3, TANGENT | | textures by TEXCOORD_4 and beyond | paths out of the folder |
@@ -44,6 +44,7 @@ mod mesh;
 mod node;
 mod normals;
 mod png_chunks;
+mod room;
 mod skin;
 mod tangents;
 mod texture;

@@ -3,9 +3,8 @@
 use std::collections::HashMap;
 
 use glam::Vec2;
-use rayon::prelude::*;
 
-use crate::{Filter, Image, Minify, Texture, TextureRef, UV_SETS, Wrap};
+use crate::{Encoding, Filter, Image, Material, Minify, Texture, TextureRef, UV_SETS, Wrap};
 
 use super::buffers::View;
 use super::decode::Decoded;
@@ -13,6 +12,7 @@ use super::document::Document;
 use super::error::Fault;
 use super::image::{Encoded, FileImage};
 use super::json::Json;
+use super::room::{Pictures, decode_all};
 
 /// The file's textures, and those that the scene has got so far.
 pub(super) struct Textures<'a> {
@@ -132,23 +132,42 @@ impl<'a> Textures<'a> {
         index
     }
 
-    /// The pictures that are shown, decoded on all cores; checkers with a warning for those that cannot be.
-    pub(super) fn decode(&mut self, document: &mut Document<'_>) -> Vec<Image> {
-        let (shown, views) = (std::mem::take(&mut self.shown), &document.views);
-        let decoded = shown
-            .into_par_iter()
-            .map(|(number, encoded)| (number, encoded.and_then(|encoded| encoded.decode(views))));
-        let decoded: Vec<(usize, Result<Decoded, Fault>)> = decoded.collect();
-        let images = decoded.into_iter().map(|(number, decoded)| {
+    /// The pictures that are shown, as large as there is room for; checkers with a warning for those that cannot be decoded.
+    pub(super) fn decode(
+        &mut self,
+        materials: &[Material],
+        document: &mut Document<'_>,
+    ) -> Vec<Image> {
+        let shown = std::mem::take(&mut self.shown);
+        let (numbers, encoded): (Vec<usize>, Vec<_>) = shown.into_iter().unzip();
+        let encodings = self.encodings(materials, numbers.len());
+        let Pictures { decoded, is_reduced, no_room } = decode_all(encoded, &encodings, document);
+        let pictures = numbers.into_iter().zip(decoded).zip(is_reduced);
+        let images = pictures.map(|((number, decoded), is_reduced)| {
             let file_image = &self.file_images[number];
             let Decoded { image, damage } = match decoded {
                 Ok(decoded) => decoded,
                 Err(fault) => return file_image.stand_in(&fault, document),
             };
             damage.iter().for_each(|damage| file_image.warn_of_damage(damage, document));
+            if let Some(fault) = no_room.as_ref().filter(|_| is_reduced) {
+                file_image.warn_of_size(fault, document);
+            }
             image
         });
         images.collect()
+    }
+
+    /// What the bytes of each picture mean: colours, if any material takes them for such.
+    fn encodings(&self, materials: &[Material], images: usize) -> Vec<Encoding> {
+        let mut encodings = vec![Encoding::Number; images];
+        for (reference, is_color) in materials.iter().flat_map(Material::textures) {
+            if is_color {
+                let texture = self.textures[reference.texture as usize];
+                encodings[texture.image as usize] = Encoding::Color;
+            }
+        }
+        encodings
     }
 }
 

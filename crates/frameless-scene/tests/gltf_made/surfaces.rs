@@ -237,7 +237,90 @@ fn an_image_of_few_bytes_cannot_fill_memory() {
         assert!(warns(&scene, reason), "{reason}: {:?}", scene.warnings);
         assert!(warns(&scene, "; --max-texture-pixels raises it"), "{:?}", scene.warnings);
     }
-    assert_eq!(load(3000, 2000).images[0].width, 3000);
+    let mut rows = vec![0; 3000 / 8 * 2000];
+    rows[0] = 1;
+    let maker = with_image(&png_of_bits(3000, 2000, &rows, &[]));
+    assert_eq!(maker.load().images[0].width, 3000);
+}
+
+/// All of one colour, as tools bake them: 300 million pixels that take nothing.
+#[test]
+fn eighteen_flat_pictures_are_a_texel_each() {
+    let mut maker = with_image(&flat_png(4096, 4096));
+    add_pictures(&mut maker, (1..18).map(|k| flat_png(4096, 4096 - k)));
+    let scene = maker.load();
+    assert!(!warns(&scene, "image"), "{:?}", scene.warnings);
+    assert_eq!(scene.images.len(), 18);
+    assert!(scene.images.iter().all(|image| image.rgba == [[0, 0, 0, 255]]));
+}
+
+/// More pictures, each in a material of its own.
+fn add_pictures(maker: &mut Maker, pictures: impl Iterator<Item = Vec<u8>>) {
+    for picture in pictures {
+        let view = maker.view(&picture);
+        let image = maker.push("images", json!({"bufferView": view}));
+        let texture = maker.push("textures", json!({"source": image}));
+        maker.push(
+            "materials",
+            json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": texture}}}),
+        );
+    }
+}
+
+/// Of few bytes, and not of one colour.
+fn smooth_png(width: u32, height: u32, blue: u8) -> Vec<u8> {
+    let texel = |x: u32, y: u32| image::Rgb([(x / 2) as u8, (y / 2) as u8, blue]);
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let picture = image::RgbImage::from_fn(width, height, texel);
+    picture.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    bytes.into_inner()
+}
+
+/// The largest is halved until all fit, with a warning whose number is enough; which of them does not depend on threads.
+#[test]
+fn pictures_for_which_there_is_no_room_are_halved() {
+    let mut maker = with_image(&smooth_png(64, 64, 0));
+    add_pictures(&mut maker, (1..5).map(|k| smooth_png(256, 255 + u32::from(k % 2), k)));
+    let load = |total_pixels| {
+        let limits = Limits { total_pixels, ..Limits::default() };
+        load_bytes("i.glb", &maker.glb(), None, &limits).unwrap()
+    };
+    let sizes = |scene: &Scene| -> Vec<[u32; 2]> {
+        scene.images.iter().map(|image| [image.width, image.height]).collect()
+    };
+    let scene = load(8 * 130_000);
+    assert_eq!(sizes(&scene), [[64, 64], [128, 128], [256, 255], [128, 128], [256, 255]]);
+    let warning = scene.warnings.iter().find(|warning| warning.contains("half")).unwrap();
+    assert!(warning.contains("images are kept at half their size or less"), "{warning}");
+    assert!(warning.ends_with("/images/1, /images/3"), "{warning}");
+    assert!(!warns(&scene, "checker"), "{:?}", scene.warnings);
+    // A texel is the mean of four: x / 2 and y / 2, rounded down, are the same for all of them.
+    assert_eq!(scene.images[3].rgba[20 * 128 + 30], [30, 20, 3, 255]);
+    let (_, enough) = warning.split_once("--max-texture-pixels raises it (").unwrap();
+    let (enough, _) = enough.split_once(" or more)").unwrap();
+    let enough: u64 = enough.parse().unwrap();
+    let whole = load(enough);
+    assert_eq!(sizes(&whole)[1..], [[256, 256], [256, 255], [256, 256], [256, 255]]);
+    assert!(!warns(&whole, "image"), "{:?}", whole.warnings);
+    assert!(warns(&load(enough - 16), "half"));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert!(pool.install(|| load(8 * 130_000)).images == scene.images);
+}
+
+/// Colours in linear light: black and white rows are half the light, 188; as numbers they are 128.
+#[test]
+fn halved_pictures_are_as_bright_as_they_were() {
+    let rows: Vec<u8> = (0..256).flat_map(|y| [if y % 2 == 0 { 0 } else { 255 }; 32]).collect();
+    let mut maker = with_image(&png_of_bits(256, 256, &rows, &[]));
+    add_pictures(&mut maker, (0..3).map(|k| smooth_png(256, 256, k)));
+    let limits = Limits { total_pixels: 8 * 70_000, ..Limits::default() };
+    for (used_as, expected) in [("baseColorTexture", 188), ("metallicRoughnessTexture", 128)] {
+        maker.json["materials"][0]["pbrMetallicRoughness"] = json!({used_as: {"index": 0}});
+        let scene = load_bytes("i.glb", &maker.glb(), None, &limits).unwrap();
+        assert!(warns(&scene, "half"), "{:?}", scene.warnings);
+        let [r, g, b, a] = scene.images[0].rgba[77];
+        assert_eq!(([r, g, b], a), ([expected; 3], 255), "{used_as}");
+    }
 }
 
 /// Whatever is in a PNG besides its picture neither takes memory nor speaks for the picture.
