@@ -272,6 +272,31 @@ fn a_mesh_that_stands_in_the_file_900_times_is_read_once() {
     is_refused("900 materials", &(document, bin), "--max-memory");
 }
 
+/// Eight million triangles, and ten seconds, of 32 MB of zeros.
+#[test]
+fn bytes_that_nothing_refers_to_speak_for_nothing() {
+    let (mut document, bin) = soup(10_000);
+    let primitive = document["meshes"][0]["primitives"][0].clone();
+    document["materials"] = json!(vec![json!({}); 400]);
+    let primitives = (0..400).map(|material| {
+        let mut primitive = primitive.clone();
+        primitive["material"] = json!(material);
+        primitive
+    });
+    document["meshes"][0]["primitives"] = primitives.collect();
+    is_refused("a soup in 400 materials", &(document.clone(), bin.clone()), "--max-memory");
+    let padding = json!({"buffer": 0, "byteOffset": bin.len(), "byteLength": 32 << 20});
+    push(&mut document, "bufferViews", padding);
+    let padded = [bin.clone(), vec![0; 32 << 20]].concat();
+    document["buffers"][0]["byteLength"] = json!(padded.len());
+    is_refused("and zeros", &(document.clone(), padded), "--max-memory");
+    // Nor do blanks, and what nobody reads of JSON.
+    document["buffers"][0]["byteLength"] = json!(bin.len());
+    document["bufferViews"].as_array_mut().expect("a list").pop();
+    document["extras"] = json!(" ".repeat(32 << 20));
+    is_refused("and blanks", &(document, bin), "--max-memory");
+}
+
 #[test]
 fn morph_targets_and_joints_are_counted_for_every_node() {
     let (mut document, bin) = triangle();

@@ -27,6 +27,8 @@ pub(super) struct Accessor<'a> {
 struct Strided<'a> {
     bytes: &'a [u8],
     stride: usize,
+    /// See [`View::in_file`].
+    in_file: bool,
 }
 
 impl<'a> Strided<'a> {
@@ -146,6 +148,13 @@ impl<'a> Accessor<'a> {
         let normalized = json.flag("normalized")?;
         let pointer = json.pointer().to_owned();
         Ok(Accessor { count, component, width, kind, pointer, normalized, dense, sparse })
+    }
+
+    /// The bytes of the file that it is of.
+    pub(super) fn pieces(&self) -> impl Iterator<Item = &'a [u8]> {
+        let sparse = self.sparse.iter().flat_map(|sparse| [sparse.indices, sparse.values]);
+        let all = self.dense.into_iter().chain(sparse);
+        all.filter(|strided| strided.in_file).map(|strided| strided.bytes)
     }
 
     /// Refuses elements of other kinds than `user` can use, where they are used.
@@ -347,5 +356,5 @@ fn strided<'a>(
             "elements within the view of {size} bytes, from byte {offset} (so many need {needed})"
         ))
     })?;
-    Ok(Strided { bytes, stride })
+    Ok(Strided { bytes, stride, in_file: view.in_file })
 }

@@ -1,6 +1,7 @@
 //! The file's binary data: buffers, and the views that cut pieces out of them.
 
 use std::borrow::Cow;
+use std::ops::Range;
 use std::path::Path;
 
 use super::compressed;
@@ -16,6 +17,8 @@ pub(super) struct View<'a> {
     pub(super) bytes: &'a [u8],
     /// Bytes from element to element; `None`: as many as an element has.
     pub(super) stride: Option<usize>,
+    /// Whether these are bytes of the file, and not what was decoded of them.
+    pub(super) in_file: bool,
 }
 
 /// Reads all buffers; the first may be the GLB's binary chunk `bin`.
@@ -113,10 +116,44 @@ fn parse_view<'b>(
             _ => return Err(stride.fault("a stride from 1 to 252 bytes")),
         },
     };
-    Ok(View { bytes, stride })
+    Ok(View { bytes, stride, in_file: decoded.is_none() })
+}
+
+/// How many bytes these are, those once that are in several of them.
+pub(super) fn distinct_bytes<'b>(pieces: impl Iterator<Item = &'b [u8]>) -> u64 {
+    let mut ranges: Vec<Range<usize>> = pieces
+        .map(|piece| piece.as_ptr_range())
+        .map(|range| range.start.addr()..range.end.addr())
+        .collect();
+    ranges.sort_unstable_by_key(|range| range.start);
+    let mut up_to = 0;
+    let counted = ranges.into_iter().map(|range| {
+        let new = range.end.saturating_sub(range.start.max(up_to));
+        up_to = up_to.max(range.end);
+        new as u64
+    });
+    counted.sum()
 }
 
 /// `bytes[offset..offset + length]`, if that exists.
 pub(super) fn slice(bytes: &[u8], offset: usize, length: usize) -> Option<&[u8]> {
     bytes.get(offset..offset.checked_add(length)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_of_several_pieces_count_once() {
+        let bytes = [0; 100];
+        let count = |pieces: &[Range<usize>]| {
+            distinct_bytes(pieces.iter().map(|piece| &bytes[piece.clone()]))
+        };
+        assert_eq!(count(&[]), 0);
+        assert_eq!(count(&[0..100, 0..100]), 100);
+        assert_eq!(count(&[50..60, 0..10, 5..20]), 30);
+        assert_eq!(count(&[0..100, 10..20, 30..40, 90..100]), 100);
+        assert_eq!(count(&[10..10, 20..30]), 10);
+    }
 }

@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 
-use super::buffers::slice;
+use super::buffers::{distinct_bytes, slice};
 use super::error::{Fault, one_line};
 use super::json::Json;
 use super::limits::Budget;
@@ -19,18 +19,22 @@ pub(super) fn is_fallback(buffer: &Json<'_>) -> Result<bool, Fault> {
 }
 
 /// Per buffer view: its bytes, if they are compressed.
-pub(super) fn decode_views(
-    root: &Json<'_>,
+pub(super) fn decode_views<'a>(
+    root: &Json<'a>,
     buffers: &[Cow<'_, [u8]>],
     budget: &mut Budget,
 ) -> Result<Vec<Option<Vec<u8>>>, Fault> {
-    let decode = |view: &Json<'_>| match view.extension(NAME)? {
-        Some(extension) => {
-            Compressed::parse(&extension, buffers)?.decode(&extension, budget).map(Some)
-        }
+    let parse = |view: &Json<'a>| match view.extension(NAME)? {
+        Some(json) => Compressed::parse(&json, buffers).map(|compressed| Some((json, compressed))),
         None => Ok(None),
     };
-    root.list("bufferViews")?.iter().map(decode).collect()
+    let views = root.list("bufferViews")?;
+    let views = views.iter().map(parse).collect::<Result<Vec<_>, Fault>>()?;
+    budget.tell(distinct_bytes(views.iter().flatten().map(|(_, compressed)| compressed.bytes)));
+    let decode = |view: Option<(Json<'_>, Compressed<'_>)>| {
+        view.map(|(json, compressed)| compressed.decode(&json, budget)).transpose()
+    };
+    views.into_iter().map(decode).collect()
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

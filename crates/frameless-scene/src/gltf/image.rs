@@ -52,6 +52,14 @@ impl<'a> FileImage<'a> {
         Ok(FileImage { json: json.clone(), source })
     }
 
+    /// The buffer view that it is in, if it is in one.
+    pub(super) fn view(&self) -> Option<usize> {
+        match self.source {
+            Source::View(view) => Some(view),
+            Source::Uri(_) | Source::Missing => None,
+        }
+    }
+
     /// What it is of, if that is anything.
     pub(super) fn bytes(&self, views: &[View<'_>]) -> Option<Bytes<'_>> {
         let there = |bytes: &[u8]| Some(Bytes::There(bytes.as_ptr().addr(), bytes.len()));
@@ -70,7 +78,9 @@ impl<'a> FileImage<'a> {
             Source::Missing => return Err(Fault::at(pointer, "a uri or a bufferView", "neither")),
             Source::View(view) => Found::View(*view),
             Source::Uri(uri) => {
-                Found::Read(uri.read(pointer, document.folder, &mut document.budget)?)
+                let bytes = uri.read(pointer, document.folder, &mut document.budget)?;
+                document.budget.tell(bytes.len() as u64);
+                Found::Read(bytes)
             }
         };
         let limits = decoder_limits(&document.budget);

@@ -236,6 +236,8 @@ pub(super) fn parse<'a>(
 fn check_size(text: &[u8], budget: &mut Budget) -> Result<(), Fault> {
     /// Its own 24, a key's as many, and what those need who read it.
     const BYTES_PER_VALUE: usize = 64;
+    /// What one says at most: a number has 12 characters with its comma, a name 20. More is blanks, or data that are told of where they are used.
+    const BYTES_TOLD: u64 = 32;
     let (mut depth, mut deepest, mut values) = (0_u64, 0_u64, 0_u64);
     let mut bytes = text.iter();
     while let Some(byte) = bytes.next() {
@@ -251,6 +253,7 @@ fn check_size(text: &[u8], budget: &mut Budget) -> Result<(), Fault> {
             _ => {}
         }
     }
+    budget.tell((text.len() as u64).min(BYTES_TOLD.saturating_mul(values)));
     within(deepest, budget.limits.json_depth, "levels of JSON nesting", "")?;
     within(values, budget.limits.json_values, "JSON values", "")?;
     budget.allocate("", values as usize, BYTES_PER_VALUE)

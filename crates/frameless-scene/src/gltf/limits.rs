@@ -12,7 +12,7 @@ pub struct Limits {
     /// Bytes of the scene file, and of each file that it names.
     pub file_bytes: u64,
     /// Bytes of everything decoded together: JSON, buffers, vertices, triangles, keyframes, texels. But for texels, a 16th part of it may be
-    /// made of nothing, and beyond that 32 times the bytes of the files: whatever a small file names over and over, it remains small.
+    /// made of nothing, and beyond that 32 times the bytes of the files, those that nothing refers to left out: whatever a small file names over and over, it remains small.
     pub decoded_bytes: u64,
     /// Triangles of all meshes together, each mesh counted once however often it is instanced.
     pub triangles: u64,
@@ -20,7 +20,8 @@ pub struct Limits {
     pub vertices: u64,
     /// Texels of one image.
     pub image_pixels: u64,
-    /// Texels of all images together.
+    /// Texels of all images together, as they are in the file. Of those that are kept an eighth of it may come of next to nothing, and beyond
+    /// that six of each byte.
     pub total_pixels: u64,
     /// Nodes in the file.
     pub nodes: u64,
@@ -70,6 +71,10 @@ pub(super) struct Budget {
     pub(super) limits: Limits,
     /// Of the scene's file and those that it names.
     file_bytes: u64,
+    /// Of these, those that say something: JSON, and what accessors and pictures are of.
+    telling_bytes: u64,
+    /// Those that have been read as they are.
+    read_bytes: u64,
     bytes: u64,
     image_bytes: u64,
     void_bytes: u64,
@@ -92,6 +97,8 @@ impl Budget {
         Budget {
             limits: limits.clone(),
             file_bytes: 0,
+            telling_bytes: 0,
+            read_bytes: 0,
             bytes: 0,
             image_bytes: 0,
             void_bytes: 0,
@@ -113,6 +120,17 @@ impl Budget {
         }
     }
 
+    /// So many bytes say something, of which more may be made.
+    pub(super) fn tell(&mut self, bytes: u64) {
+        self.telling_bytes = self.telling_bytes.saturating_add(bytes);
+    }
+
+    /// So many bytes are about to be read as they are, whether they say anything or not.
+    pub(super) fn read(&mut self, pointer: &str, bytes: usize) -> Result<(), Fault> {
+        self.read_bytes = self.read_bytes.saturating_add(bytes as u64);
+        self.allocate(pointer, bytes, 1)
+    }
+
     /// `count` things of `each` bytes are about to be allocated for what stands at `pointer`.
     pub(super) fn allocate(
         &mut self,
@@ -129,11 +147,12 @@ impl Budget {
             .map_err(|fault| fault.telling(|came| (came - of_files).saturating_mul(MADE_SHARE)))
     }
 
-    /// What may be made of nothing, and beyond that of files of this size.
+    /// What may be made of nothing, and beyond that of files that say so much.
     fn made(&self) -> [u64; 2] {
         // Whoever wants less than usual of all does not want less of small files.
         let most = self.limits.decoded_bytes.max(Limits::default().decoded_bytes);
-        [most / MADE_SHARE, MADE_PER_BYTE.saturating_mul(self.file_bytes)]
+        let of_files = MADE_PER_BYTE.saturating_mul(self.telling_bytes);
+        [most / MADE_SHARE, of_files.saturating_add(self.read_bytes)]
     }
 
     /// The same of an accessor without data, whose elements are zeros until a sparse one replaces some: morph targets that move little.
@@ -378,9 +397,12 @@ mod tests {
         assert!(budget.allocate("/a", 1 << 28, 1).is_ok());
         let refusal = budget.allocate("/a", 320, 1).unwrap_err().in_file("f").to_string();
         assert!(refusal.contains("--max-memory raises it (4097M or more)"), "{refusal}");
-        budget.add_file(Path::new(""), 10);
         budget.add_file(Path::new(""), 1 << 40);
+        assert!(budget.allocate("/a", 1, 1).is_err(), "bytes that say nothing");
+        budget.tell(10);
         assert!(budget.allocate("/a", 320, 1).is_ok());
+        assert!(budget.allocate("/a", 1, 1).is_err());
+        assert!(budget.read("/a", 1000).is_ok());
         assert!(budget.allocate("/a", 1, 1).is_err());
         // Whoever wants twice as much of all has twice as much of nothing.
         let limits = Limits { decoded_bytes: 8 << 30, ..Limits::default() };
@@ -450,6 +472,14 @@ mod tests {
         };
         assert!(add(11).is_err());
         assert!(add(10).is_ok());
+    }
+
+    #[test]
+    fn a_file_that_is_named_twice_counts_once() {
+        let mut budget = budget_of(&Limits::default(), 80);
+        budget.add_file(Path::new(""), 1 << 40);
+        assert!(budget.place_instances("/nodes/0", 50_010).is_ok());
+        assert!(budget.place_instances("/nodes/1", 1).is_err());
     }
 
     #[test]

@@ -7,7 +7,7 @@ use crate::{Camera, Contents, Geometry, Material, Node, Scene, Skin, State, Targ
 
 use super::accessor::{Accessor, parse_accessors};
 use super::animation::{Movers, Nodes, load_animation};
-use super::buffers::{load_buffers, parse_views};
+use super::buffers::{distinct_bytes, load_buffers, parse_views};
 use super::camera::load_cameras;
 use super::choice::Choice;
 use super::compressed::decode_views;
@@ -166,6 +166,8 @@ fn build(document: &mut Document<'_>, choice: &Choice) -> Result<Scene, Fault> {
     let root = document.root.clone();
     let mut hierarchy = load_nodes(&root, choice.scene.as_ref(), &limits, &mut document.warnings)?;
     let mut textures = Textures::parse(&root, &document.views)?;
+    let pieces = document.accessors.iter().flat_map(Accessor::pieces);
+    document.budget.tell(distinct_bytes(pieces.chain(textures.pieces(&document.views))));
     let mut scene =
         Scene { materials: load_materials(document, &mut textures)?, ..Scene::default() };
     scene.images = textures.decode(&scene.materials, document);

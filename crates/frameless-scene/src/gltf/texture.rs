@@ -64,6 +64,13 @@ impl<'a> Textures<'a> {
         })
     }
 
+    /// The bytes of the file that its pictures are of, but for those of other files.
+    pub(super) fn pieces<'v>(&self, views: &'v [View<'_>]) -> impl Iterator<Item = &'v [u8]> {
+        let shown =
+            self.file_images.iter().filter_map(|image| image.view()).map(|view| views[view]);
+        shown.filter(|view| view.in_file).map(|view| view.bytes)
+    }
+
     /// The texture that the member `key` of `holder` refers to, if it is there; `owner` is the material's.
     pub(super) fn refer(
         &mut self,

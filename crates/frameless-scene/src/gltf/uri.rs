@@ -55,7 +55,7 @@ impl<'a> Uri<'a> {
         match self {
             Uri::Data(text) => decode_base64(text, pointer, budget),
             Uri::Plain(text) => {
-                budget.allocate(pointer, text.len(), 1)?;
+                budget.read(pointer, text.len())?;
                 Ok(percent_decode_str(text).collect())
             }
             Uri::Relative(path) => {
@@ -101,7 +101,7 @@ fn decode_base64(text: &str, pointer: &str, budget: &mut Budget) -> Result<Vec<u
         &STANDARD,
         GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
     );
-    budget.allocate(pointer, text.len() / 4 + 1, 3)?;
+    budget.read(pointer, 3 * (text.len() / 4 + 1))?;
     LENIENT.decode(text).map_err(|error| Fault::at(pointer, "base64 text", error))
 }
 
@@ -132,7 +132,7 @@ pub(super) fn read_file(
     let bytes = file.metadata().map_err(failed)?.len();
     within(bytes, limit, "bytes of file", pointer)?;
     budget.add_file(path, bytes as usize);
-    budget.allocate(pointer, bytes as usize, 1)?;
+    budget.read(pointer, bytes as usize)?;
     let mut content = Vec::with_capacity(bytes as usize);
     // The file may grow while it is read: what it was is what counts.
     file.take(bytes).read_to_end(&mut content).map_err(failed)?;
