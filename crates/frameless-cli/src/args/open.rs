@@ -71,7 +71,7 @@ pub(crate) struct LimitArgs {
     #[arg(long, value_name = "N", default_value_t = Limits::default().triangles)]
     max_triangles: u64,
 
-    /// Pixels of all textures together, and of the environment
+    /// Pixels of all textures together, and of the environment; beyond six per byte of file and an eighth of this, textures are halved
     #[arg(long, value_name = "N", default_value_t = Limits::default().total_pixels)]
     max_texture_pixels: u64,
 
