@@ -10,11 +10,12 @@
 //! wait, first come first served, and hold a bit for each.
 
 use std::collections::VecDeque;
+use std::hint::select_unpredictable;
 
 use super::tiles::{Tile, Tiles};
 use super::why::Why;
 use crate::tile::TileGrid;
-use crate::traced::{Mark, Place, TILE_PIXELS, Traced, half_ticks};
+use crate::traced::{Mark, Place, Traced, half_ticks};
 use crate::wide::{self, M8, Task, Unit};
 use crate::{Canvas, Observation, Time};
 
@@ -31,6 +32,8 @@ const MOST_AT_ONCE: f64 = 2.0;
 const AHEAD: usize = 64;
 /// So many changes are looked at together.
 const MANY: usize = 1024;
+/// So many rows of a tile.
+const ROWS: u32 = 4;
 
 /// Pixels beside changes, tile by tile.
 pub(crate) struct Front {
@@ -43,18 +46,18 @@ pub(crate) struct Front {
     changed: Vec<(Place, Mark)>,
     parts: usize,
     /// Reused from batch to batch.
-    near: Vec<Near>,
+    runs: Vec<Pixels>,
+    near: Vec<Pixels>,
     begin_to_wait: Vec<u32>,
 }
 
-/// Pixels of a tile that are beside a change.
+/// Pixels of a tile that are changes, or beside changes: a bit for each.
 #[derive(Clone, Copy, Debug, Default)]
-struct Near {
+struct Pixels {
     tile: u32,
-    /// When the change was found.
+    /// When the change was found, the last one if there are several.
     found: Mark,
-    /// In at most three rows.
-    pixels: u64,
+    bits: u64,
 }
 
 /// A bit per pixel of a tile.
@@ -80,47 +83,6 @@ pub(super) fn is_part(observed: &Observation) -> bool {
     observed.known & (observed.change > 3.0 * FRONT_CHANGE)
 }
 
-/// The neighbours of a pixel of a tile.
-#[derive(Clone, Copy)]
-struct Beside {
-    /// In the tile itself.
-    own: u64,
-    /// In the tile to the left or right, above or below, and in the one at the corner; those to which [`Beside::step`] leads.
-    others: [u64; 3],
-    /// To the other tiles: columns, rows.
-    step: [i32; 2],
-}
-
-const BESIDE: [Beside; TILE_PIXELS] = {
-    let mut all = [Beside { own: 0, others: [0; 3], step: [0; 2] }; TILE_PIXELS];
-    let mut within = 0;
-    while within < TILE_PIXELS {
-        let (x, y) = (within as i32 % 8, within as i32 / 8);
-        let mut i = 0;
-        while i < 9 {
-            let (nx, ny) = (x + i % 3 - 1, y + i / 3 - 1);
-            let bit = if i == 4 { 0 } else { 1 << (ny.rem_euclid(8) * 8 + nx.rem_euclid(8)) };
-            let (dx, dy) = (nx.div_euclid(8), ny.div_euclid(8));
-            let beside = &mut all[within];
-            if dx != 0 {
-                beside.step[0] = dx;
-            }
-            if dy != 0 {
-                beside.step[1] = dy;
-            }
-            match (dx != 0, dy != 0) {
-                (false, false) => beside.own |= bit,
-                (true, false) => beside.others[0] |= bit,
-                (false, true) => beside.others[1] |= bit,
-                (true, true) => beside.others[2] |= bit,
-            }
-            i += 1;
-        }
-        within += 1;
-    }
-    all
-};
-
 impl Front {
     pub(crate) fn new() -> Front {
         Front {
@@ -129,6 +91,7 @@ impl Front {
             adapted: Time::ZERO,
             changed: Vec::new(),
             parts: 0,
+            runs: Vec::new(),
             near: Vec::new(),
             begin_to_wait: Vec::new(),
         }
@@ -160,11 +123,11 @@ impl Front {
     /// The neighbours of samples that are part of a front wait from now on.
     pub(crate) fn observe(&mut self, tiles: &mut Tiles, canvas: &Canvas) {
         let (traced, fresh) = (canvas.traced(), half_ticks(self.fresh_secs));
-        let Front { changed, parts, near, begin_to_wait, waiting, .. } = self;
+        let Front { changed, parts, runs, near, begin_to_wait, waiting, .. } = self;
         for changed in changed[..*parts].chunks(MANY) {
-            let count = find_near(changed, traced.grid(), near);
-            let near = &near[..count];
-            begin_to_wait.resize(count.max(begin_to_wait.len()), 0);
+            let runs = find_runs(changed, runs);
+            let near = find_near(runs, traced.grid(), near);
+            begin_to_wait.resize(near.len().max(begin_to_wait.len()), 0);
             let mut begin = 0;
             wide::run(LookAtNear { near, traced, fresh, tiles, begin_to_wait, count: &mut begin });
             waiting.extend(&begin_to_wait[..begin]);
@@ -229,36 +192,69 @@ impl Front {
     }
 }
 
-/// What is beside changes, tile by tile. Returns how many there are.
-fn find_near(changed: &[(Place, Mark)], grid: &TileGrid, near: &mut Vec<Near>) -> usize {
-    near.resize((4 * changed.len()).max(near.len()), Near::default());
-    let mut count = 0;
+/// Changes that follow each other in the same tile, together.
+fn find_runs<'a>(changed: &[(Place, Mark)], runs: &'a mut Vec<Pixels>) -> &'a [Pixels] {
+    runs.resize(changed.len().max(runs.len()), Pixels::default());
+    let (mut run, mut count) = (Pixels { tile: u32::MAX, ..Pixels::default() }, 0);
     for &(place, found) in changed {
-        let Beside { own, others: [beside, beyond, corner], step: [dx, dy] } =
-            BESIDE[place.within()];
-        let (tile, [column, row]) = (place.tile() as u32, grid.column_and_row(place.tile()));
-        let across = (dx != 0) & (column.wrapping_add_signed(dx) < grid.columns);
-        let down = (dy != 0) & (row.wrapping_add_signed(dy) < grid.rows);
-        let (side, other) = (tile.wrapping_add_signed(dx), dy * grid.columns as i32);
-        // Written in any case, so that nobody has to guess which there are.
-        let four = near[count..].first_chunk_mut::<4>().expect("room for four each");
+        let tile = place.tile() as u32;
+        // Written in any case, so that nobody has to guess where runs end.
+        let goes_on = tile == run.tile;
+        count += usize::from(!goes_on);
+        let before = select_unpredictable(goes_on, run.bits, 0);
+        run = Pixels { tile, found, bits: before | 1 << place.within() };
+        runs[count - 1] = run;
+    }
+    &runs[..count]
+}
+
+/// The first and the last column of a tile.
+const COLUMNS: [u64; 2] = [0x0101_0101_0101_0101, 0x8080_8080_8080_8080];
+/// The pixels of a tile that have neighbours in four.
+const CORNERS: u64 = 0x8100_0000_0000_0081;
+/// A tile and those around it.
+const TILES: usize = 9;
+
+/// What is beside changes, tile by tile.
+fn find_near<'a>(runs: &[Pixels], grid: &TileGrid, near: &'a mut Vec<Pixels>) -> &'a [Pixels] {
+    near.resize((TILES * runs.len()).max(near.len()), Pixels::default());
+    let mut count = 0;
+    for &Pixels { tile, found, bits } in runs {
+        let [column, row] = grid.column_and_row(tile as usize);
+        let [left, right] = [column > 0, column + 1 < grid.columns];
+        let [above, below] = [row > 0, row + 1 < grid.rows];
+        let near = near[count..].first_chunk_mut::<TILES>().expect("room for all");
         let mut next = 0;
-        let mut put = |tile: u32, pixels: u64, is_there: bool| {
-            four[next % 4] = Near { tile, found, pixels };
-            next += usize::from(is_there);
+        // Written in any case, so that nobody has to guess which there are.
+        let mut put = |[dx, dy]: [i32; 2], is_there: bool, bits: u64| {
+            let tile = tile.wrapping_add_signed(dy * grid.columns as i32 + dx);
+            near[next % TILES] = Pixels { tile, found, bits };
+            next += usize::from(is_there & (bits != 0));
         };
-        put(tile, own, true);
-        put(side, beside, across);
-        put(tile.wrapping_add_signed(other), beyond, down);
-        put(side.wrapping_add_signed(other), corner, across & down);
+        let tall = bits | bits << 8 | bits >> 8;
+        let [first, last] = COLUMNS.map(|column| tall & column);
+        let wide = tall | (tall ^ last) << 1 | (tall ^ first) >> 1;
+        // They themselves have just been traced.
+        put([0, 0], true, wide & !bits);
+        put([-1, 0], left, first << 7);
+        put([1, 0], right, last >> 7);
+        let [top, bottom] = [bits & 0xff, bits >> 56];
+        put([0, -1], above, (top | top << 1 | top >> 1) << 56);
+        put([0, 1], below, (bottom | bottom << 1 | bottom >> 1) & 0xff);
+        if (bits & CORNERS) != 0 {
+            put([-1, -1], above & left, (top & 1) << 63);
+            put([1, -1], above & right, (top >> 7) << 56);
+            put([-1, 1], below & left, (bottom & 1) << 7);
+            put([1, 1], below & right, bottom >> 7);
+        }
         count += next;
     }
-    count
+    &near[..count]
 }
 
 /// Finds the tiles that begin to wait.
 struct LookAtNear<'a> {
-    near: &'a [Near],
+    near: &'a [Pixels],
     traced: &'a Traced,
     /// In half ticks.
     fresh: i32,
@@ -274,26 +270,31 @@ impl Task for LookAtNear<'_> {
     #[inline(always)]
     fn run<U: Unit>(self) {
         let LookAtNear { near, traced, fresh, tiles, begin_to_wait, count } = self;
-        let first_row = |pixels: u64| (pixels.trailing_zeros() / 8).min(5) as usize;
+        let first_row = |bits: u64| (bits.trailing_zeros() / 8).min(8 - ROWS) as usize;
         let mut waiting = 0;
-        for (i, &Near { tile, found, pixels }) in near.iter().enumerate() {
+        for (i, &Pixels { tile, found, bits }) in near.iter().enumerate() {
             if let Some(later) = near.get(i + AHEAD) {
                 let (marks, first) =
-                    (&traced.tiles()[later.tile as usize].0, first_row(later.pixels));
+                    (&traced.tiles()[later.tile as usize].0, first_row(later.bits));
                 wide::prefetch(marks, 8 * first);
                 wide::prefetch(marks, 8 * (first + 2));
+                wide::prefetch(marks, 8 * (first + 3));
                 tiles.prefetch(later.tile as usize);
             }
             let marks = &traced.tiles()[tile as usize].0;
-            // Always three rows, so that nobody has to guess how many.
-            let first = first_row(pixels);
             let latest = M8::<U>::splat(found.0.wrapping_sub(fresh as u32));
-            let mut young = 0;
-            for row in 0..3 {
-                let since = latest.minus(M8::load(marks, 8 * (first + row)));
-                young |= u64::from(since.signs()) << (8 * row);
+            let (mut rest, mut stale) = (bits, 0);
+            // Four rows at a time, so that nobody has to guess how many: mostly that is all.
+            while rest != 0 {
+                let (first, mut young) = (first_row(rest), 0);
+                for row in 0..ROWS as usize {
+                    let since = latest.minus(M8::load(marks, 8 * (first + row)));
+                    young |= u64::from(since.signs()) << (8 * row);
+                }
+                let rows = u64::from(u32::MAX) << (8 * first);
+                stale |= rest & rows & !(young << (8 * first));
+                rest &= !rows;
             }
-            let stale = pixels & !(young << (8 * first));
             let Tile { front, waits, .. } = tiles.of_mut(tile as usize);
             front.beside |= stale;
             // Neither is it guessed who begins to wait.
@@ -308,7 +309,7 @@ impl Task for LookAtNear<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Size;
+    use crate::{Rng, Size};
 
     fn found(pixel: u32, now: Time, change: f32) -> Observation {
         Observation { pixel, now, previous: Time::ZERO, known: true, change, refinement: None }
@@ -394,6 +395,38 @@ mod tests {
                 let near: Vec<u32> = (0..size.pixels() as u32).filter(near).collect();
                 assert_eq!(followed(&mut front, &canvas), near, "pixel {pixel} of {size:?}");
             }
+        }
+    }
+
+    #[test]
+    fn changes_that_are_heard_of_together_have_the_neighbours_of_all() {
+        let (size, now, mut rng) = (Size::new(27, 21), Time::from_secs(1.0), Rng::new(5));
+        for count in [2, 3, 5, 9, 40] {
+            let mut canvas = Canvas::from_picture(size, vec![[0.0; 3]; size.pixels()]);
+            let mut changed: Vec<u32> =
+                (0..count).map(|_| rng.below(size.pixels() as u32)).collect();
+            // Tile by tile, as fronts are followed: runs, and in the tallest of them all rows.
+            changed.sort_by_key(|&pixel| canvas.traced().place(pixel).tile());
+            changed.dedup();
+            for &pixel in &changed {
+                canvas.replace(pixel, now, [0.0; 3]);
+            }
+            let mut front = Fronts::new(canvas.traced().grid().len());
+            front.0.expect(changed.len());
+            for &pixel in &changed {
+                front.0.hear(&found(pixel, now, 0.1), canvas.traced().place(pixel), Why::Tile);
+            }
+            front.0.observe(&mut front.1, &canvas);
+            let is_near = |pixel: &u32| {
+                let (x, y) = size.xy(*pixel);
+                let beside = |&change: &u32| {
+                    let (u, v) = size.xy(change);
+                    x.abs_diff(u) < 2 && y.abs_diff(v) < 2
+                };
+                changed.iter().any(beside) && !changed.contains(pixel)
+            };
+            let near: Vec<u32> = (0..size.pixels() as u32).filter(is_near).collect();
+            assert_eq!(followed(&mut front, &canvas), near, "of {changed:?}");
         }
     }
 

@@ -19,11 +19,11 @@ use crate::wide::{self, F8, Task, Unit};
 /// How many blocks are swept over at a time: one for each bit of a mask.
 const LANES: usize = 32;
 /// The most draws that a block waits for.
-const MOST_AT_ONCE: f32 = 2.5;
+const MOST_AT_ONCE: f32 = 2.8;
 /// For every so many blocks (102,400 pixels) it waits for one more.
 const BLOCKS_PER_DRAW: f32 = 100.0;
 /// How many blocks ahead of the one at hand the next is fetched.
-const AHEAD: usize = 8;
+const AHEAD: usize = 16;
 
 /// w of all tiles, at least 0.
 pub(super) trait Weigh {
