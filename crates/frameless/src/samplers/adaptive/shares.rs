@@ -3,7 +3,7 @@
 //! ```text
 //! got ← got + a · Σ w + b · Σ e     for every block, once per draw of a Σ w + b Σ e tiles
 //! if got ≥ g:   that many tiles of the block are drawn, got ← 0
-//! g = number of blocks / 100, in [1, 2.5]
+//! g = number of blocks / 100, in [1, 2.8]
 //! ```
 //!
 //! So what a sweep looks at is a 16th of the tiles: in 4K that takes as long as in small pictures one over all of them. Blocks that get little are
