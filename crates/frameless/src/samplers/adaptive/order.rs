@@ -164,8 +164,8 @@ mod tests {
     #[test]
     fn ranks_are_places_in_the_order() {
         let order = Order::new();
-        for within in 0..TILE_PIXELS {
-            assert_eq!(order.peek(RANKS[within]), within);
+        for (within, &rank) in RANKS.iter().enumerate() {
+            assert_eq!(order.peek(rank), within);
         }
     }
 
