@@ -7,7 +7,7 @@ use frameless_scene::Limits;
 use frameless_trace::{CpuTracer, Settings, ViewSource, World};
 
 use super::sampler::RATE;
-use super::table::Row;
+use super::table::{Row, median};
 use crate::args::BenchArgs;
 use crate::failure::Failure;
 use crate::input;
@@ -82,5 +82,5 @@ fn nanos_per_pixel(world: &Arc<World>, case: &Case, args: &BenchArgs, seed: u64)
     let mut nanos: Vec<f64> =
         (WARM_UP_REFRESHES..WARM_UP_REFRESHES + measured).map(refresh).collect();
     nanos.sort_by(f64::total_cmp);
-    nanos[nanos.len() / 2]
+    median(&nanos)
 }

@@ -6,6 +6,7 @@ use frameless::{Clock, Engine, SamplerKind};
 use frameless_scene::Limits;
 use frameless_trace::{CpuTracer, Settings, ViewSource, World};
 
+use super::scaling::Waited;
 use super::table::Row;
 use crate::args::BenchArgs;
 use crate::failure::Failure;
@@ -15,7 +16,8 @@ use crate::input;
 const WARM_UP_SECS: f64 = 0.2;
 
 /// Rows `engine.<sampler>_samples_per_sec` and `engine.<sampler>_over_random`, the ratio round by round; and
-/// `engine.update_share`: what bringing the scene to a batch's time takes, of the time from batch to batch.
+/// `engine.update_share`: what bringing the scene to a batch's time takes, of the time from batch to batch. `engine.not_tracing_share`: that, and all
+/// that the loop's thread does beside the renderer with the default sampler (choosing, keeping, observing), of all threads' time.
 pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
     let world = Arc::new(World::new(Arc::new(input::scene(
         args.scene(),
@@ -23,7 +25,8 @@ pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
         &Limits::default(),
     )?)));
     let mut rates = SamplerKind::ALL.map(|_| Vec::new());
-    let mut update_shares = Vec::new();
+    let (mut update_shares, mut not_tracing_shares) = (Vec::new(), Vec::new());
+    let threads = super::threads(args) as f64;
     for round in 0..args.rounds {
         // Everybody is first as often as last: the machine's speed drifts within a round too.
         for turn in 0..SamplerKind::ALL.len() {
@@ -33,7 +36,9 @@ pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
             rates[i].push(speed.samples_per_sec);
             if kind == SamplerKind::default() {
                 let update_secs = update_secs(&world, speed.batches_per_sec, args.secs);
-                update_shares.push(update_secs * speed.batches_per_sec);
+                let update_share = update_secs * speed.batches_per_sec;
+                update_shares.push(update_share);
+                not_tracing_shares.push((update_share + speed.beside_share) / threads);
             }
         }
     }
@@ -58,6 +63,8 @@ pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
         rows.push(Row::new(name, "ratio", &ratios, &conditions));
     }
     rows.push(Row::new("engine.update_share", "of a batch's time", &update_shares, &conditions));
+    let name = "engine.not_tracing_share";
+    rows.push(Row::new(name, "of all threads' time", &not_tracing_shares, &conditions));
     Ok(rows)
 }
 
@@ -65,15 +72,18 @@ pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
 struct Speed {
     samples_per_sec: f64,
     batches_per_sec: f64,
+    /// The part of its time that the loop's thread is not with the renderer.
+    beside_share: f64,
 }
 
 fn speed(world: &Arc<World>, kind: SamplerKind, args: &BenchArgs, seed: u64) -> Speed {
     let settings = Settings { surfaces: false, ..Settings::default() };
     let view = ViewSource::Camera(0);
     let tracer = CpuTracer::new(Arc::clone(world), view, settings, args.threads).in_real_time();
+    let tracer = Waited::new(tracer, Clock::real());
     let mut engine = Engine::new(args.size, Clock::real(), kind.build(seed), tracer);
     let mut run_for = |secs: f64| {
-        let (begin, before) = (engine.now(), engine.counters());
+        let (begin, before, waited) = (engine.now(), engine.counters(), engine.tracer().secs);
         while engine.now().secs_since(begin) < secs {
             engine.step().expect("the tracer's colours are finite");
         }
@@ -81,6 +91,7 @@ fn speed(world: &Arc<World>, kind: SamplerKind, args: &BenchArgs, seed: u64) -> 
         Speed {
             samples_per_sec: (after.kept - before.kept) as f64 / elapsed,
             batches_per_sec: (after.batches - before.batches) as f64 / elapsed,
+            beside_share: 1.0 - (engine.tracer().secs - waited) / elapsed,
         }
     };
     run_for(WARM_UP_SECS);

@@ -206,10 +206,14 @@ impl User {
         let begin = self.clock.now();
         self.render.send(Command::View(ViewChoice::Free(self.looks[0].0)));
         loop {
-            match self.news.recv_timeout(PATIENCE) {
+            let waited = Duration::from_secs_f64(self.clock.now().secs_since(begin));
+            match self.news.recv_timeout(PATIENCE.saturating_sub(waited)) {
                 Ok(News::Kept(time)) => return Ok(time.secs_since(begin)),
                 Ok(News::Report) => self.take_reports()?,
-                Err(_) => anyhow::bail!("the loop has not answered for {PATIENCE:?}"),
+                Err(_) => anyhow::bail!(
+                    "no sample has shown the new camera for {PATIENCE:?}: either the loop stands still, or no surface is seen \
+                     elsewhere after a turn by 6° (give a larger --size, or a --scene whose camera sees something)"
+                ),
             }
         }
     }

@@ -86,13 +86,21 @@ const GROWTH: [Size; 2] = [Size { width: 128, height: 96 }, Size { width: 2048, 
 fn growth(args: &BenchArgs) -> [Row; 3] {
     let conditions = format!(
         "938 samples per batch, adaptive+hold, never refreshed, from a known picture; the left tenth changes colour from batch to batch, \
-         whatever its size, which costs nothing to trace; one thread, {} rounds of {} s after half a second",
+         whatever its size, which costs nothing to trace; one thread, {} alternating rounds of {} s after half a second",
         args.rounds, args.secs
     );
-    let nanos = |size: Size| -> Vec<f64> {
-        (0..args.rounds).map(|seed| flickering_nanos(size, args.secs, u64::from(seed))).collect()
-    };
-    let [small, large] = GROWTH.map(nanos);
+    let [mut small, mut large] = [Vec::new(), Vec::new()];
+    for round in 0..args.rounds {
+        let nanos = |size: Size| flickering_nanos(size, args.secs, u64::from(round));
+        // Either is first as often as last: the machine's speed drifts.
+        if round % 2 == 0 {
+            small.push(nanos(GROWTH[0]));
+            large.push(nanos(GROWTH[1]));
+        } else {
+            large.push(nanos(GROWTH[1]));
+            small.push(nanos(GROWTH[0]));
+        }
+    }
     let growth: Vec<f64> = large.iter().zip(&small).map(|(large, small)| large / small).collect();
     [
         Row::new("sampler.choose_observe_ns_128x96", "ns/sample", &small, &conditions),

@@ -100,7 +100,7 @@ fn run(world: &Arc<World>, case: &Case, args: &BenchArgs, threads: usize, seed: 
     let settings = Settings { surfaces, ..Settings::default() };
     let tracer = CpuTracer::new(Arc::clone(world), ViewSource::Camera(0), settings, threads);
     let clock = Clock::real();
-    let waited = Waited { tracer, clock: clock.clone(), secs: 0.0 };
+    let waited = Waited::new(tracer, clock.clone());
     let sampler = SamplerKind::default().build(seed);
     let mut engine = Engine::new(args.size, Clock::real(), sampler, waited);
     engine.set_reconstruction(case.reconstruction.build());
@@ -127,10 +127,16 @@ fn run(world: &Arc<World>, case: &Case, args: &BenchArgs, threads: usize, seed: 
 }
 
 /// Adds up how long the loop's thread is with the renderer.
-struct Waited {
+pub(super) struct Waited {
     tracer: CpuTracer,
     clock: Clock,
-    secs: f64,
+    pub(super) secs: f64,
+}
+
+impl Waited {
+    pub(super) fn new(tracer: CpuTracer, clock: Clock) -> Waited {
+        Waited { tracer, clock, secs: 0.0 }
+    }
 }
 
 impl Tracer for Waited {

@@ -33,9 +33,16 @@ impl Row {
         let mut sorted = rounds.to_vec();
         sorted.sort_by(f64::total_cmp);
         let (min, max) = (sorted[0], sorted[sorted.len() - 1]);
-        let value = sorted[sorted.len() / 2];
+        let value = median(&sorted);
         Row { name: name.into(), value, min, max, unit, conditions: conditions.to_owned() }
     }
+}
+
+/// Of numbers in order, at least one: of an even number the mean of the two in the middle.
+pub(super) fn median(sorted: &[f64]) -> f64 {
+    let upper = sorted.len() / 2;
+    let lower = (sorted.len() - 1) / 2;
+    0.5 * (sorted[lower] + sorted[upper])
 }
 
 pub(super) fn json(rows: &[Row]) -> String {
@@ -61,4 +68,18 @@ pub(super) fn plain(rows: &[Row]) -> String {
 fn four_digits(value: f64) -> String {
     let before_point = value.abs().max(1e-9).log10().floor() as i32 + 1;
     format!("{:.*}", (4 - before_point).clamp(0, 6) as usize, value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_of_an_even_number_lies_between_the_two_in_the_middle() {
+        let value = |rounds: &[f64]| Row::new("name", "ns", rounds, "").value;
+        assert_eq!(value(&[3.0]), 3.0);
+        assert_eq!(value(&[5.0, 1.0]), 3.0);
+        assert_eq!(value(&[9.0, 1.0, 2.0]), 2.0);
+        assert_eq!(value(&[4.0, 1.0, 9.0, 2.0]), 3.0);
+    }
 }

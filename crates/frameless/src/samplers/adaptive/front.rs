@@ -225,7 +225,8 @@ fn find_near<'a>(runs: &[Pixels], grid: &TileGrid, near: &'a mut Vec<Pixels>) ->
         let [above, below] = [row > 0, row + 1 < grid.rows];
         let near = near[count..].first_chunk_mut::<TILES>().expect("room for all");
         let mut next = 0;
-        // Written in any case, so that nobody has to guess which there are.
+        // Written in any case, so that nobody has to guess which there are. Some may lie beyond the picture, in tiles that are cut: whoever
+        // follows them leaves these out.
         let mut put = |[dx, dy]: [i32; 2], is_there: bool, bits: u64| {
             let tile = tile.wrapping_add_signed(dy * grid.columns as i32 + dx);
             near[next % TILES] = Pixels { tile, found, bits };

@@ -88,11 +88,13 @@ impl Order {
         let others = !(recent.now | recent.before);
         let others = select_unpredictable(others == 0, u64::MAX, others);
         let rank = u32::from(*turn) + others.rotate_right(u32::from(*turn)).trailing_zeros();
-        let next = (rank as u8).wrapping_add(1);
-        let passes = (*turn ^ next) & PART != 0;
-        recent.before = select_unpredictable(passes, recent.now, recent.before);
-        recent.now = select_unpredictable(passes, 0, recent.now);
-        *turn = next;
+        let next = rank + 1;
+        // How many parts the turn comes into: what was traced in the one before the present one is recent, unless it jumps over that.
+        let parts = next / PART - u32::from(*turn) / PART;
+        recent.before = select_unpredictable(parts == 0, recent.before, recent.now);
+        recent.before = select_unpredictable(parts < 2, recent.before, 0);
+        recent.now = select_unpredictable(parts == 0, recent.now, 0);
+        *turn = next as u8;
         self.peek(rank as u8)
     }
 }
@@ -104,8 +106,8 @@ pub(super) struct Recent {
     before: u64,
 }
 
-/// Which parts of the order turns are in: sixteen pixels each.
-const PART: u8 = 0b11_0000;
+/// Pixels of a part of the order.
+const PART: u32 = 16;
 
 impl Recent {
     #[inline(always)]
@@ -181,6 +183,19 @@ mod tests {
         assert_eq!(seen[..60], others[..60], "the 41st is looked at again: two parts have passed");
         assert_eq!(tile.next(&mut order), turns[63]);
         assert_eq!(tile.next(&mut order), turns[0]);
+    }
+
+    #[test]
+    fn a_turn_that_jumps_over_parts_forgets_what_was_traced_before_them() {
+        let mut order = Order::new();
+        for (jump, is_recent) in [(14, true), (15, true), (30, true), (31, false), (50, false)] {
+            let mut tile = Tile::default();
+            // All up to there, and one that comes long after.
+            (0..jump).chain([60]).for_each(|rank| tile.recent.traced(order.peek(rank)));
+            assert_eq!(tile.next(&mut order), order.peek(jump));
+            let recent = (tile.recent.now | tile.recent.before) >> 60 & 1 == 1;
+            assert_eq!(recent, is_recent, "over {jump}");
+        }
     }
 
     #[test]
