@@ -35,6 +35,12 @@ fn picture(side: u32, number: u32) -> Vec<u8> {
     bytes.into_inner()
 }
 
+fn written(picture: &image::DynamicImage, format: image::ImageFormat) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, format).expect("it is written");
+    bytes.into_inner()
+}
+
 /// A file with these pictures.
 fn glb(pictures: &[Vec<u8>]) -> Vec<u8> {
     let (mut views, mut bin) = (Vec::new(), Vec::new());
@@ -88,4 +94,21 @@ fn what_asks_for_much_takes_little() {
     assert!(!scene.warnings[0].contains("checker"), "{:?}", scene.warnings);
     let allowed = 8.0 * 10e6 + 32.0 * of_pictures as f64;
     assert!(taken < allowed, "{taken:.3e} bytes, {allowed:.3e} allowed");
+    drop(scene);
+
+    // Read where they are kept: beside that, 16 bits of grey took eight bytes for each pixel, and a damaged JPEG seven.
+    let grey = image::ImageBuffer::from_fn(3000, 3000, |x, y| image::Luma([(x * 31 + y) as u16]));
+    let grey = written(&image::DynamicImage::from(grey), image::ImageFormat::Png);
+    let colors = image::RgbImage::from_fn(3000, 3000, |x, y| image::Rgb([x as u8, y as u8, 9]));
+    let mut cut = written(&image::DynamicImage::from(colors), image::ImageFormat::Jpeg);
+    cut.truncate(cut.len() - 999);
+    for picture in [grey, cut] {
+        let file = glb(std::slice::from_ref(&picture));
+        std::fs::write("/proc/self/clear_refs", "5").expect("Linux begins anew");
+        let before = most();
+        let scene = load_bytes("picture", &file, None, &Limits::default()).expect("it is read");
+        let taken = (most() - before) / 9e6;
+        assert_eq!(scene.images[0].width, 3000, "{:?}", scene.warnings);
+        assert!(taken < 6.0, "{taken:.1} bytes per pixel");
+    }
 }

@@ -7,9 +7,7 @@
 use std::fmt::Display;
 use std::io::Cursor;
 
-use image::DynamicImage::{ImageLumaA8, ImageLumaA16, ImageRgba8, ImageRgba16};
-use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader};
-use png::ColorType::{GrayscaleAlpha, Rgba};
+use image::{ColorType, ImageDecoder, ImageFormat, ImageReader};
 use zune_core::bytestream::ZCursor;
 use zune_core::colorspace::ColorSpace;
 use zune_core::options::DecoderOptions;
@@ -23,6 +21,8 @@ use super::error::one_line;
 pub(super) struct Decoded {
     pub(super) image: Image,
     pub(super) damage: Option<String>,
+    /// Whether a strict decoder gave up, and a lenient one began again.
+    pub(super) is_read_twice: bool,
 }
 
 /// What the decoders of this program read.
@@ -49,19 +49,113 @@ pub(super) fn decode(picture: &[u8], limits: &image::Limits) -> Result<Decoded, 
         _ => (Err(String::new()), missing_bytes(picture)),
     };
     let (decoded, wrong) = match strict {
-        Ok(decoded) => (decoded, None),
-        Err(wrong) => {
-            let decoder = lenient(picture, limits).map_err(|error| one_line(&error))?;
-            let decoded = DynamicImage::from_decoder(decoder).map_err(|error| one_line(&error))?;
-            (decoded, Some(wrong).filter(|wrong| !wrong.is_empty()))
-        }
+        Ok(image) => (image, None),
+        Err(wrong) => (leniently(picture, limits)?, Some(wrong)),
     };
-    let (width, height) = (decoded.width(), decoded.height());
-    // In place: a copy would be the largest thing in memory.
-    let rgba = bytemuck::try_cast_vec(decoded.into_rgba8().into_raw());
-    let rgba = rgba.map_err(|(error, _)| one_line(&error))?;
-    let image = without_repetition(Image { width, height, rgba });
-    Ok(Decoded { image, damage: told.or(wrong) })
+    let is_read_twice = wrong.is_some();
+    let wrong = wrong.filter(|wrong| !wrong.is_empty());
+    Ok(Decoded { image: without_repetition(decoded), damage: told.or(wrong), is_read_twice })
+}
+
+/// As far as the lenient decoder reads it.
+fn leniently(picture: &[u8], limits: &image::Limits) -> Result<Image, String> {
+    let decoder = lenient(picture, limits).map_err(said)?;
+    let (size, color, length) =
+        (decoder.dimensions(), decoder.color_type(), decoder.total_bytes());
+    let layout = Layout::of(color).ok_or("colours of another kind")?;
+    let mut texels = layout.texels(size, length)?;
+    decoder.read_image(&mut texels.as_flattened_mut()[..length as usize]).map_err(said)?;
+    Ok(layout.rgba(size, texels, u16::from_ne_bytes))
+}
+
+/// What a decoder makes of each pixel.
+#[derive(Clone, Copy, Debug)]
+struct Layout {
+    channels: usize,
+    bytes_per_channel: usize,
+}
+
+impl Layout {
+    fn of(color: ColorType) -> Option<Layout> {
+        use ColorType::{L8, L16, La8, La16, Rgb8, Rgb16, Rgba8, Rgba16};
+        [L8, La8, Rgb8, Rgba8, L16, La16, Rgb16, Rgba16].contains(&color).then(|| {
+            let channels = usize::from(color.channel_count());
+            Layout { channels, bytes_per_channel: usize::from(color.bytes_per_pixel()) / channels }
+        })
+    }
+
+    fn bytes_per_pixel(self) -> usize {
+        self.channels * self.bytes_per_channel
+    }
+
+    /// Room for what is decoded, of `length` bytes, and for what is made of it in the same place: a copy would be the largest thing in memory.
+    fn texels(self, (width, height): (u32, u32), length: u64) -> Result<Vec<[u8; 4]>, String> {
+        let pixels = width as usize * height as usize;
+        if length != (pixels * self.bytes_per_pixel()) as u64 {
+            return Err("another number of bytes than its pixels have".to_owned());
+        }
+        Ok(vec![[0; 4]; pixels.max((length as usize).div_ceil(4))])
+    }
+
+    /// The picture of which the pixels stand at the beginning of `texels`.
+    fn rgba(
+        self,
+        (width, height): (u32, u32),
+        mut texels: Vec<[u8; 4]>,
+        word: fn([u8; 2]) -> u16,
+    ) -> Image {
+        let pixels = width as usize * height as usize;
+        let bytes = texels.as_flattened_mut();
+        match (self.bytes_per_channel, self.channels) {
+            (1, 1) => expand(bytes, pixels, |[l]| [l, l, l, 255]),
+            (1, 2) => expand(bytes, pixels, |[l, a]| [l, l, l, a]),
+            (1, 3) => expand(bytes, pixels, |[r, g, b]| [r, g, b, 255]),
+            (1, _) => {}
+            (_, 1) => expand(bytes, pixels, |[l, m]| {
+                let l = byte(word([l, m]));
+                [l, l, l, 255]
+            }),
+            (_, 2) => expand(bytes, pixels, |[l, m, a, b]| {
+                let l = byte(word([l, m]));
+                [l, l, l, byte(word([a, b]))]
+            }),
+            (_, 3) => contract(bytes, pixels, |[r, s, g, h, b, c]| {
+                [byte(word([r, s])), byte(word([g, h])), byte(word([b, c])), 255]
+            }),
+            (_, _) => contract(bytes, pixels, |[r, s, g, h, b, c, a, d]| {
+                [[r, s], [g, h], [b, c], [a, d]].map(|two| byte(word(two)))
+            }),
+        }
+        texels.truncate(pixels);
+        texels.shrink_to_fit();
+        Image { width, height, rgba: texels }
+    }
+}
+
+/// The nearest of 8 bits.
+fn byte(word: u16) -> u8 {
+    ((u32::from(word) + 128) / 257) as u8
+}
+
+/// From the last to the first, as each takes no less than before.
+fn expand<const N: usize>(bytes: &mut [u8], pixels: usize, rgba: impl Fn([u8; N]) -> [u8; 4]) {
+    for pixel in (0..pixels).rev() {
+        place(bytes, pixel, &rgba);
+    }
+}
+
+/// From the first to the last, as each takes no more than before.
+fn contract<const N: usize>(bytes: &mut [u8], pixels: usize, rgba: impl Fn([u8; N]) -> [u8; 4]) {
+    for pixel in 0..pixels {
+        place(bytes, pixel, &rgba);
+    }
+}
+
+#[inline]
+fn place<const N: usize>(bytes: &mut [u8], pixel: usize, rgba: impl Fn([u8; N]) -> [u8; 4]) {
+    let mut from = [0; N];
+    from.copy_from_slice(&bytes[N * pixel..N * pixel + N]);
+    bytes[4 * pixel..4 * pixel + 4].copy_from_slice(&rgba(from));
 }
 
 /// A picture all of one colour as one texel, which looks the same from everywhere.
@@ -81,45 +175,26 @@ fn said(error: impl Display) -> String {
 }
 
 /// With all checksums right.
-fn strict_png(picture: &[u8], limits: &image::Limits) -> Result<DynamicImage, String> {
+fn strict_png(picture: &[u8], limits: &image::Limits) -> Result<Image, String> {
     let mut options = png::DecodeOptions::default();
     options.set_ignore_adler32(false);
     let mut decoder = png::Decoder::new_with_options(Cursor::new(picture), options);
     let most = limits.max_alloc.and_then(|bytes| usize::try_from(bytes).ok());
     decoder.set_limits(png::Limits { bytes: most.unwrap_or(usize::MAX) });
-    // Four channels at once: a copy would be the largest thing in memory.
+    // Four channels at once, or grey and alpha.
     decoder.set_transformations(png::Transformations::EXPAND | png::Transformations::ALPHA);
     let mut reader = decoder.read_info().map_err(said)?;
     let length = reader.output_buffer_size().ok_or("too large")?;
-    let ((width, height), (channels, depth)) = (reader.info().size(), reader.output_color_type());
-    let decoded = match depth {
-        png::BitDepth::Sixteen => {
-            let mut words = vec![0u16; length.div_ceil(2)];
-            let bytes = bytemuck::cast_slice_mut(&mut words);
-            reader.next_frame(bytes).map_err(said)?;
-            words.iter_mut().for_each(|word| *word = u16::from_be(*word));
-            match channels {
-                Rgba => ImageBuffer::from_raw(width, height, words).map(ImageRgba16),
-                GrayscaleAlpha => ImageBuffer::from_raw(width, height, words).map(ImageLumaA16),
-                _ => None,
-            }
-        }
-        _ => {
-            let mut bytes = vec![0; length];
-            reader.next_frame(&mut bytes).map_err(said)?;
-            match channels {
-                Rgba => ImageBuffer::from_raw(width, height, bytes).map(ImageRgba8),
-                GrayscaleAlpha => ImageBuffer::from_raw(width, height, bytes).map(ImageLumaA8),
-                _ => None,
-            }
-        }
-    };
-    // Says nothing, as this is no fault of the file: the other decoder reads it.
-    decoded.ok_or_else(String::new)
+    let (size, (color, depth)) = (reader.info().size(), reader.output_color_type());
+    let bytes_per_channel = if depth == png::BitDepth::Sixteen { 2 } else { 1 };
+    let layout = Layout { channels: color.samples(), bytes_per_channel };
+    let mut texels = layout.texels(size, length as u64)?;
+    reader.next_frame(&mut texels.as_flattened_mut()[..length]).map_err(said)?;
+    Ok(layout.rgba(size, texels, u16::from_be_bytes))
 }
 
 /// Without anything that is left out or made up.
-fn strict_jpeg(picture: &[u8]) -> Result<DynamicImage, String> {
+fn strict_jpeg(picture: &[u8]) -> Result<Image, String> {
     let options = DecoderOptions::default()
         .set_strict_mode(true)
         .set_max_width(usize::MAX)
@@ -136,8 +211,10 @@ fn strict_jpeg(picture: &[u8]) -> Result<DynamicImage, String> {
     let options = options.jpeg_set_out_colorspace(ColorSpace::RGBA);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(picture), options);
     let rgba = decoder.decode().map_err(said)?;
-    let decoded = ImageBuffer::from_raw(info.width.into(), info.height.into(), rgba);
-    decoded.map(ImageRgba8).ok_or_else(String::new)
+    let rgba: Vec<[u8; 4]> = bytemuck::try_cast_vec(rgba).map_err(|_| String::new())?;
+    let (width, height) = (u32::from(info.width), u32::from(info.height));
+    let has_all = rgba.len() == width as usize * height as usize;
+    has_all.then_some(Image { width, height, rgba }).ok_or_else(String::new)
 }
 
 /// JPEGs end with a marker (ITU T.81 §B.1.1.3).
@@ -249,6 +326,38 @@ mod tests {
         let cut = header(true, &[0x11; 4], 1);
         for length in 0..cut.len() {
             let _ = working_bytes(&cut[..length], [u32::MAX; 2], u64::MAX);
+        }
+    }
+
+    /// Of every kind, strictly and leniently, as the library `image` converts them.
+    #[test]
+    fn pixels_are_those_of_the_library_image() {
+        use image::{DynamicImage, Rgba};
+        let texel = |x: u32, y: u32| {
+            let word = |k: u32| ((x * 7919 + y * 104_729 + k * 28_657) % 65_536) as u16;
+            Rgba([word(1), word(2), word(3), word(4)])
+        };
+        let all = DynamicImage::ImageRgba16(image::ImageBuffer::from_fn(37, 5, texel));
+        let kinds = [
+            DynamicImage::from(all.to_luma8()),
+            all.to_luma_alpha8().into(),
+            all.to_rgb8().into(),
+            all.to_rgba8().into(),
+            all.to_luma16().into(),
+            all.to_luma_alpha16().into(),
+            all.to_rgb16().into(),
+            all,
+        ];
+        for kind in kinds {
+            let mut png = Cursor::new(Vec::new());
+            kind.write_to(&mut png, ImageFormat::Png).unwrap();
+            let (png, color, limits) = (png.into_inner(), kind.color(), image::Limits::default());
+            let expected = kind.into_rgba8().into_raw();
+            let strict = strict_png(&png, &limits).unwrap();
+            assert_eq!(strict.rgba.as_flattened(), expected, "{color:?}");
+            let lenient = leniently(&png, &limits).unwrap();
+            assert_eq!(lenient.rgba.as_flattened(), expected, "{color:?}");
+            assert_eq!((lenient.width, lenient.height), (37, 5));
         }
     }
 

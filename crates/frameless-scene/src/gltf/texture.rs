@@ -152,7 +152,7 @@ impl<'a> Textures<'a> {
         let pictures = numbers.into_iter().zip(decoded).zip(is_reduced);
         let images = pictures.map(|((number, decoded), is_reduced)| {
             let file_image = &self.file_images[number];
-            let Decoded { image, damage } = match decoded {
+            let Decoded { image, damage, .. } = match decoded {
                 Ok(decoded) => decoded,
                 Err(fault) => return file_image.stand_in(&fault, document),
             };
