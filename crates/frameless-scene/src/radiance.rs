@@ -44,12 +44,17 @@ pub(crate) fn read_picture(
         let wanted = "a Radiance picture (.hdr)".to_owned();
         (read.get(), Problem::Unexpected { wanted, came: one_line(came) })
     };
+    let cut = |error: io::Error| match error.kind() {
+        io::ErrorKind::UnexpectedEof => unexpected(&"the end of the file"),
+        _ => unexpected(&error),
+    };
     let begin = file.file.fill_buf().map_err(|error| (0, Problem::Io(error)))?;
     if ![&b"#?RADIANCE"[..], b"#?RGBE"].iter().any(|name| begin.starts_with(name)) {
         return Err(unexpected(&"other bytes"));
     }
+    let header = read_header(&mut file).map_err(cut)?;
     let (width, height) =
-        HdrDecoder::new(&mut file).map_err(|error| unexpected(&error))?.dimensions();
+        HdrDecoder::new(&header[..]).map_err(|error| unexpected(&error))?.dimensions();
     check_environment_size(width, height, bytes, limits)
         .map_err(|problem| (read.get(), problem))?;
     if width == 0 || height == 0 {
@@ -57,9 +62,29 @@ pub(crate) fn read_picture(
     }
     let mut texels = vec![[0; 4]; width as usize * height as usize];
     for row in texels.chunks_exact_mut(width as usize) {
-        read_row(&mut file, row).map_err(|error| unexpected(&error))?;
+        read_row(&mut file, row).map_err(cut)?;
     }
     Ok((width, height, texels))
+}
+
+/// The lines until an empty one, and that of the size, under the name that the decoder knows.
+fn read_header(file: &mut impl BufRead) -> io::Result<Vec<u8>> {
+    /// The decoder keeps each line several times; programs write a few hundred bytes, and a line for each of their runs.
+    const MOST: u64 = 1 << 16;
+    let mut file = file.take(MOST);
+    let mut line = |header: &mut Vec<u8>| {
+        let begin = header.len();
+        match file.read_until(b'\n', header)? {
+            _ if header.ends_with(b"\n") => Ok(header.len() - begin > 1),
+            _ if file.limit() == 0 => Err(invalid("a header of more than 64 KiB")),
+            _ => Err(io::ErrorKind::UnexpectedEof.into()),
+        }
+    };
+    line(&mut Vec::new())?;
+    let mut header = b"#?RADIANCE\n".to_vec();
+    while line(&mut header)? {}
+    line(&mut header)?;
+    Ok(header)
 }
 
 fn read_row(file: &mut impl Read, row: &mut [[u8; 4]]) -> io::Result<()> {
@@ -147,6 +172,17 @@ impl<F: Read> Read for Counted<'_, F> {
     }
 }
 
+impl<F: BufRead> BufRead for Counted<'_, F> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        self.file.fill_buf()
+    }
+
+    fn consume(&mut self, count: usize) {
+        self.file.consume(count);
+        self.read.set(self.read.get() + count as u64);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -188,6 +224,40 @@ mod tests {
         assert!(refusal(&huge, &Limits::default()).contains("pixels in one image"));
         let small = Limits { decoded_bytes: 8, ..Limits::default() };
         assert!(refusal(&whole, &small).contains("decoded bytes"));
+    }
+
+    #[test]
+    fn both_names_are_known() {
+        let old = [b"#?RGBE", &hdr(2)[10..]].concat();
+        assert_eq!(
+            decode(&old, &Limits::default()).unwrap(),
+            decode(&hdr(2), &Limits::default()).unwrap()
+        );
+    }
+
+    /// Each line of it is kept several times: one of 20 MB took 557 MB.
+    #[test]
+    fn a_header_is_short() {
+        let with = |lines: usize| {
+            let [name, rest] = [&hdr(2)[..11], &hdr(2)[11..]].map(<[u8]>::to_vec);
+            [name, b"a=b\n".repeat(lines), rest].concat()
+        };
+        assert!(decode(&with(16_000), &Limits::default()).is_ok());
+        let (offset, problem) = decode(&with(17_000), &Limits::default()).unwrap_err();
+        assert_eq!(offset, 1 << 16);
+        assert!(problem.to_string().contains("64 KiB"), "{problem}");
+    }
+
+    #[test]
+    fn a_file_that_ends_too_soon_is_said_to() {
+        let whole = hdr(2);
+        for length in [9, 20, 42, whole.len() - 1] {
+            let (offset, problem) = decode(&whole[..length], &Limits::default()).unwrap_err();
+            let text = problem.to_string();
+            let expected = if length < 10 { "other bytes" } else { "the end of the file" };
+            assert!(text.contains(expected), "{length}: {text}");
+            assert!(length < 10 || offset == length as u64, "{length}: {offset}");
+        }
     }
 
     #[test]
