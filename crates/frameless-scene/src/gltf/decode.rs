@@ -60,8 +60,7 @@ pub(super) fn decode(picture: &[u8], limits: &image::Limits) -> Result<Decoded, 
 /// As far as the lenient decoder reads it.
 fn leniently(picture: &[u8], limits: &image::Limits) -> Result<Image, String> {
     let decoder = lenient(picture, limits).map_err(said)?;
-    let (size, color, length) =
-        (decoder.dimensions(), decoder.color_type(), decoder.total_bytes());
+    let (size, color, length) = (decoder.dimensions(), decoder.color_type(), decoder.total_bytes());
     let layout = Layout::of(color).ok_or("colours of another kind")?;
     let mut texels = layout.texels(size, length)?;
     decoder.read_image(&mut texels.as_flattened_mut()[..length as usize]).map_err(said)?;
@@ -251,6 +250,37 @@ pub(super) fn working_bytes(picture: &[u8], [width, height]: [u32; 2], decoded_b
     }
 }
 
+/// How much there is to do until a picture is decoded: as for so many pixels of an ordinary one, 8 bits per channel without loss.
+pub(super) fn work_pixels(picture: &[u8], [width, height]: [u32; 2]) -> u64 {
+    let pixels = u64::from(width) * u64::from(height);
+    match format_of(picture) {
+        // Each scan looks at all coefficients again, and once they are all there each block is transformed.
+        Some(ImageFormat::Jpeg) => match Frame::of(picture).filter(|frame| frame.is_kept) {
+            Some(frame) => {
+                let looks = SCANS_PER_TRANSFORM.saturating_add(frame.scans);
+                let more = frame.coefficients(pixels).saturating_mul(looks) / SCANS_PER_PIXEL;
+                pixels.saturating_add(more)
+            }
+            None => pixels,
+        },
+        Some(ImageFormat::WebP) => pixels.saturating_mul(3) / 2,
+        _ if is_deep_png(picture) => pixels.saturating_mul(2),
+        _ => pixels,
+    }
+}
+
+/// Scans of next to no bytes take a 64th of what a pixel takes, 0.15 of 10 ns.
+const SCANS_PER_PIXEL: u64 = 64;
+/// What else is done once for each coefficient, in scans.
+const SCANS_PER_TRANSFORM: u64 = 8;
+
+/// Whether a PNG has 16 bits per channel (ISO 15948 §11.2.2).
+fn is_deep_png(picture: &[u8]) -> bool {
+    /// After the signature, and the chunk's length and name: width, height, depth.
+    const DEPTH: usize = 8 + 8 + 8;
+    picture.get(DEPTH) == Some(&16)
+}
+
 /// How the samples of a JPEG are arranged (ITU T.81 §B.2.2).
 struct Frame {
     /// Σ horizontal · vertical sampling over all channels, and the most of each.
@@ -258,6 +288,8 @@ struct Frame {
     most: [u64; 2],
     /// Whether all of them are kept until the end: a progressive one, or one whose channels come one after the other.
     is_kept: bool,
+    /// Times that samples are gone through.
+    scans: u64,
 }
 
 impl Frame {
@@ -283,11 +315,16 @@ impl Frame {
                         samples += x * y;
                         most = [most[0].max(x), most[1].max(y)];
                     }
-                    frame = Some(Frame { samples, most, is_kept: kind == 0xc2 });
+                    frame = Some(Frame { samples, most, is_kept: kind == 0xc2, scans: 0 });
                 }
                 0xda => {
                     let is_part = *segment.first()? < channels;
-                    return frame.map(|frame| Frame { is_kept: frame.is_kept || is_part, ..frame });
+                    let scans = 1 + rest.windows(2).filter(|two| *two == [0xff, 0xda]).count();
+                    return frame.map(|frame| Frame {
+                        is_kept: frame.is_kept || is_part,
+                        scans: scans as u64,
+                        ..frame
+                    });
                 }
                 _ => {}
             }
@@ -359,6 +396,23 @@ mod tests {
             assert_eq!(lenient.rgba.as_flattened(), expected, "{color:?}");
             assert_eq!((lenient.width, lenient.height), (37, 5));
         }
+    }
+
+    #[test]
+    fn scans_and_deep_channels_are_work() {
+        let work = |picture: &[u8]| work_pixels(picture, [100, 100]);
+        let plain = header(false, &[0x22, 0x11, 0x11], 3);
+        assert_eq!(work(&plain), 10_000);
+        let progressive = header(true, &[0x22, 0x11, 0x11], 3);
+        assert_eq!(work(&progressive), 10_000 + 15_000 * (8 + 1) / 64);
+        let scan = b"\xff\xda\x00\x03\x03";
+        let many = [&progressive[..], &scan.repeat(99)].concat();
+        assert_eq!(work(&many), 10_000 + 15_000 * (8 + 100) / 64);
+        let mut png = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0d\0\0\0d\x08\0\0\0\0".to_vec();
+        assert_eq!(work(&png), 10_000);
+        png[24] = 16;
+        assert_eq!(work(&png), 20_000);
+        assert_eq!(work(b"RIFF\0\0\0\0WEBPVP8 "), 15_000);
     }
 
     #[test]

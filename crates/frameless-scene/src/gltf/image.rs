@@ -10,7 +10,7 @@ use image::ImageDecoder;
 use crate::Image;
 
 use super::buffers::View;
-use super::decode::{Decoded, decode, format_of, lenient, working_bytes};
+use super::decode::{Decoded, decode, format_of, lenient, work_pixels, working_bytes};
 use super::document::Document;
 use super::error::{Fault, one_line};
 use super::json::Json;
@@ -105,8 +105,9 @@ impl<'a> FileImage<'a> {
         if width == 0 || height == 0 {
             return Err(Fault::at(pointer, "an image", "no pixels"));
         }
+        let work_pixels = work_pixels(&picture, [width, height]);
         drop(picture);
-        Ok(Encoded { found, pointer: pointer.to_owned(), limits, working_bytes })
+        Ok(Encoded { found, pointer: pointer.to_owned(), limits, working_bytes, work_pixels })
     }
 
     /// Says what is wrong with the file of a picture that is drawn all the same.
@@ -139,6 +140,8 @@ pub(super) struct Encoded {
     limits: image::Limits,
     /// What is in memory while it is decoded.
     pub(super) working_bytes: u64,
+    /// How much there is to do until it is decoded, in pixels of an ordinary one.
+    pub(super) work_pixels: u64,
 }
 
 #[derive(Debug)]

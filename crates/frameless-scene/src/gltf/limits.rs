@@ -226,8 +226,11 @@ impl Budget {
         let told = (encoded_bytes as u64).min(self.file_bytes.saturating_sub(self.picture_bytes));
         self.picture_bytes += told;
         // Those of 16 bits per channel take as much as two.
-        let taken = pixels.max(decoded_bytes / 4).max(working_bytes / BYTES_PER_PIXEL);
-        self.check_thin_pixels(pointer, taken, told)?;
+        let taken = pixels.max(decoded_bytes / 4);
+        // What is told is the limit that it would pass if it were kept.
+        self.check_thin(pointer, taken, told, SINGLE_SHARE)
+            .or_else(|_| self.check_thin(pointer, taken, told, THIN_SHARE))?;
+        self.check_thin(pointer, working_bytes / BYTES_PER_PIXEL, told, THIN_SHARE)?;
         spend(&mut self.pixels, pixels, self.limits.total_pixels, "pixels in all images", pointer)?;
         let limit = self.limits.decoded_bytes.saturating_sub(self.bytes);
         within(working_bytes, limit, "decoded bytes", pointer)
@@ -236,17 +239,36 @@ impl Budget {
 
     /// Refuses so many pixels in all pictures together, as they are kept.
     pub(super) fn check_pixels(&self, pixels: u64) -> Result<(), Fault> {
-        self.check_thin_pixels("", pixels, self.picture_bytes)?;
+        self.check_thin("", pixels, self.picture_bytes, THIN_SHARE)?;
         let limit = self.limits.decoded_bytes.saturating_sub(self.bytes);
         within(image_bytes(pixels), limit, "decoded bytes", "")
             .map_err(|fault| fault.telling(|came| came.saturating_add(self.bytes)))
     }
 
-    fn check_thin_pixels(&self, pointer: &str, pixels: u64, bytes: u64) -> Result<(), Fault> {
+    fn check_thin(&self, pointer: &str, pixels: u64, bytes: u64, share: u64) -> Result<(), Fault> {
         let thin = pixels.saturating_sub(PIXELS_PER_BYTE.saturating_mul(bytes));
-        let limit = self.limits.total_pixels / THIN_SHARE;
+        let limit = self.limits.total_pixels / share;
         within(thin, limit, "pixels in images of few bytes", pointer)
             .map_err(|fault| fault.telling(|came| pixels.max(came.saturating_mul(THIN_SHARE))))
+    }
+
+    /// Refuses so much work to decode pictures, in pixels; `all` is what there would be for all of them.
+    pub(super) fn check_work(&self, pixels: u64, all: u64) -> Result<(), Fault> {
+        let of_files = PIXELS_PER_BYTE.saturating_mul(self.picture_bytes);
+        let limit = WORK_EIGHTHS.saturating_mul(self.limits.total_pixels / 8);
+        if pixels.saturating_sub(of_files) <= limit {
+            return Ok(());
+        }
+        // Any of them may have to be read twice.
+        let enough =
+            all.max(pixels).saturating_mul(2).saturating_sub(of_files).div_ceil(WORK_EIGHTHS);
+        within(
+            all.max(pixels),
+            limit.saturating_add(of_files),
+            "pixels to decode in all images",
+            "",
+        )
+        .map_err(|fault| fault.telling(|_| enough.saturating_mul(8)))
     }
 
     /// All pictures together are kept so.
@@ -271,9 +293,14 @@ impl Budget {
 /// Pixels that a byte of a picture's file speaks for: with their smaller copies they take 32 bytes, as much as a byte speaks for elsewhere. JPEGs
 /// have 2 to 20, drawings of a few flat colours 10 to 50.
 const PIXELS_PER_BYTE: u64 = 6;
-/// Of all texels, those that may come from next to nothing: by default 62 million, a second's work and 400 MB. A file of a few kilobytes could
-/// take as much as the largest scenes otherwise.
+/// Of all texels, those that may be kept of next to nothing: by default 62 million, 400 MB with their smaller copies. A file of a few kilobytes
+/// could take as much as the largest scenes otherwise.
 const THIN_SHARE: u64 = 8;
+/// The same of one picture that is decoded, to be halved then or kept as one texel: by default 71 million. One of 8192×8192 has 67.
+const SINGLE_SHARE: u64 = 7;
+/// Of eight parts of all texels, those that may be decoded of next to nothing, whether they are kept or not: by default 312 million, three seconds
+/// of one core. Eighteen pictures of 4096×4096 all of one colour, as baked ones are, are 302 million.
+const WORK_EIGHTHS: u64 = 5;
 /// Bytes that may be made of one. What is compressed best (EXT_meshopt_compression, quantised to 8 bits) is made into about 20 times as much.
 const MADE_PER_BYTE: u64 = 32;
 
@@ -336,9 +363,10 @@ pub(super) fn flag_of(what: &str) -> Option<&'static str> {
         | "keyframes"
         | "JSON values" => "--max-memory",
         "triangles" | "vertices" => "--max-triangles",
-        "pixels in one image" | "pixels in all images" | "pixels in images of few bytes" => {
-            "--max-texture-pixels"
-        }
+        "pixels in one image"
+        | "pixels in all images"
+        | "pixels in images of few bytes"
+        | "pixels to decode in all images" => "--max-texture-pixels",
         "nodes" => "--max-nodes",
         "levels of nodes" => "--max-nesting",
         "instances" | "instances from few bytes of file" => "--max-instances",
@@ -457,6 +485,19 @@ mod tests {
         let most = 62_500_000 + 6 * (2 << 20);
         assert!(budget.check_pixels(most).is_ok());
         assert!(budget.check_pixels(most + 1).is_err());
+    }
+
+    #[test]
+    fn one_picture_of_8192_squared_is_decoded() {
+        let mut budget = budget_of(&Limits::default(), 100);
+        let bytes = 4 << 26;
+        let size = PictureSize {
+            pixels: [8192, 8192],
+            decoded_bytes: bytes,
+            working_bytes: bytes,
+            encoded_bytes: 100,
+        };
+        assert!(budget.add_image("/images/0", &size).is_ok());
     }
 
     #[test]

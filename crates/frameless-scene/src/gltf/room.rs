@@ -41,15 +41,24 @@ pub(super) fn decode_all(
             Err(fault) => room.decoded[index] = Some(Err(fault)),
         }
     }
+    let work = waiting.iter().map(|(_, encoded)| encoded.work_pixels);
+    room.all_work_pixels = work.fold(0, u64::saturating_add);
     waiting.sort_by_key(|(_, encoded)| Reverse(encoded.working_bytes));
-    while let Some((_, first)) = waiting.first() {
+    while !waiting.is_empty() {
+        room.refuse_work(&mut waiting, &document.budget);
+        let Some((_, first)) = waiting.first() else { break };
         room.make(first.working_bytes, &document.budget, encodings);
         let count = room.count(&waiting, &document.budget);
         let next: Vec<_> = waiting.drain(..count).collect();
         let views = &document.views;
-        let decoded = next.into_par_iter().map(|(index, encoded)| (index, encoded.decode(views)));
-        let decoded: Vec<(usize, Result<Decoded, Fault>)> = decoded.collect();
-        decoded.into_iter().for_each(|(index, decoded)| room.put(index, decoded));
+        let decoded = next.into_par_iter();
+        let decoded =
+            decoded.map(|(index, encoded)| (index, encoded.work_pixels, encoded.decode(views)));
+        let decoded: Vec<(usize, u64, Result<Decoded, Fault>)> = decoded.collect();
+        for (index, work_pixels, decoded) in decoded {
+            room.work(work_pixels, &decoded);
+            room.put(index, decoded);
+        }
         while document.budget.check_pixels(room.pixels).is_err() && room.halve_largest(encodings) {}
     }
     document.budget.keep_pixels(room.pixels);
@@ -67,6 +76,10 @@ struct Room {
     /// Of all, as they are kept, and as they are in the file.
     pixels: u64,
     pixels_in_file: u64,
+    /// What has been done to decode them.
+    work_pixels: u64,
+    /// What would be done to decode all of them, each once.
+    all_work_pixels: u64,
     /// The limit that was in the way when one was to be decoded beside those that were kept.
     none_meanwhile: Option<Fault>,
 }
@@ -79,6 +92,8 @@ impl Room {
             largest: BinaryHeap::new(),
             pixels: 0,
             pixels_in_file: 0,
+            work_pixels: 0,
+            all_work_pixels: 0,
             none_meanwhile: None,
         }
     }
@@ -87,6 +102,24 @@ impl Room {
     fn check(&self, working_bytes: u64, budget: &Budget) -> Result<(), Fault> {
         let kept = self.pixels.saturating_mul(size_of::<[u8; 4]>() as u64);
         budget.check_decoders(kept.saturating_add(working_bytes))
+    }
+
+    /// Those that would be too much to decode, the largest first, are not decoded at all.
+    fn refuse_work(&mut self, waiting: &mut Vec<(usize, Encoded)>, budget: &Budget) {
+        waiting.retain(|&(index, Encoded { work_pixels, .. })| {
+            let work_pixels = self.work_pixels.saturating_add(work_pixels);
+            let refusal = budget.check_work(work_pixels, self.all_work_pixels);
+            let Err(fault) = refusal else { return true };
+            self.decoded[index] = Some(Err(fault));
+            false
+        });
+    }
+
+    /// Counts it: twice what was begun again.
+    fn work(&mut self, work_pixels: u64, decoded: &Result<Decoded, Fault>) {
+        let is_read_twice = decoded.as_ref().map_or(true, |decoded| decoded.is_read_twice);
+        let times = if is_read_twice { 2 } else { 1 };
+        self.work_pixels = self.work_pixels.saturating_add(work_pixels.saturating_mul(times));
     }
 
     /// Room for one picture to be decoded, as far as there can be.
@@ -101,10 +134,12 @@ impl Room {
 
     /// How many of those waiting may be decoded at once; one at least.
     fn count(&self, waiting: &[(usize, Encoded)], budget: &Budget) -> usize {
-        let mut working_bytes = 0_u64;
+        let (mut working_bytes, mut work_pixels) = (0_u64, self.work_pixels);
         let fits = waiting.iter().take_while(|(_, encoded)| {
             working_bytes = working_bytes.saturating_add(encoded.working_bytes);
+            work_pixels = work_pixels.saturating_add(encoded.work_pixels);
             self.check(working_bytes, budget).is_ok()
+                && budget.check_work(work_pixels, work_pixels).is_ok()
         });
         fits.count().max(1)
     }

@@ -307,6 +307,29 @@ fn pictures_for_which_there_is_no_room_are_halved() {
     assert!(pool.install(|| load(8 * 130_000)).images == scene.images);
 }
 
+/// Flat pictures take no room, but time: what is too much is not decoded, and the warning's number is enough.
+#[test]
+fn decoding_is_bounded_though_nothing_is_kept() {
+    let mut maker = with_image(&flat_png(256, 249));
+    add_pictures(&mut maker, (0..7).map(|k| flat_png(256, 250 + k)));
+    let load = |total_pixels| {
+        let limits = Limits { total_pixels, ..Limits::default() };
+        load_bytes("i.glb", &maker.glb(), None, &limits).unwrap()
+    };
+    let checkers = |scene: &Scene| scene.images.iter().filter(|image| image.width == 8).count();
+    let scene = load(8 * 70_000);
+    assert_eq!(checkers(&scene), 3, "{:?}", scene.warnings);
+    let warning = scene.warnings.iter().find(|warning| warning.contains("checker")).unwrap();
+    assert!(warning.contains("pixels to decode in all images"), "{warning}");
+    let (_, enough) = warning.split_once("--max-texture-pixels raises it (").unwrap();
+    let (enough, _) = enough.split_once(" or more)").unwrap();
+    let whole = load(enough.parse().unwrap());
+    assert_eq!(checkers(&whole), 0);
+    assert!(!warns(&whole, "image"), "{:?}", whole.warnings);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert!(pool.install(|| load(8 * 70_000)).images == scene.images);
+}
+
 /// Colours in linear light: black and white rows are half the light, 188; as numbers they are 128.
 #[test]
 fn halved_pictures_are_as_bright_as_they_were() {
