@@ -52,8 +52,9 @@ pub(super) fn decode(picture: &[u8], limits: &image::Limits) -> Result<Decoded, 
         Ok(image) => (image, None),
         Err(wrong) => (leniently(picture, limits)?, Some(wrong)),
     };
-    let is_read_twice = wrong.is_some();
+    // Nothing is said of those that only the lenient decoder reads.
     let wrong = wrong.filter(|wrong| !wrong.is_empty());
+    let is_read_twice = wrong.is_some();
     Ok(Decoded { image: without_repetition(decoded), damage: told.or(wrong), is_read_twice })
 }
 
