@@ -7,7 +7,7 @@ use frameless_scene::{
     AfterEnd, Camera, Geometry, Image, Influences, Light, LightKind, Mesh, MorphTarget, Projection,
     Scene, Target,
 };
-use frameless_trace::World;
+use frameless_trace::{Overlap, World};
 
 use crate::args::InfoArgs;
 use crate::failure::Failure;
@@ -25,18 +25,19 @@ pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     // Whether it can be drawn is known when it has been made ready for that.
     let world = World::new(Arc::clone(&scene));
     let overlap = world.check_overlap(&args.scene, &limits).map_err(Failure::bad_input)?;
-    Ok(output::print(&describe(&scene, overlap))?)
+    Ok(output::print(&describe(&scene, &overlap))?)
 }
 
 /// A paragraph of lines `what  how many`, lists indented below, warnings last.
-fn describe(scene: &Scene, overlap: u64) -> String {
+fn describe(scene: &Scene, overlap: &Overlap) -> String {
     let mut lines = vec![format!("scene       {}", scene.name)];
     let contents = &scene.contents;
     let shown: Vec<usize> = contents.shown_scene.into_iter().collect();
     lines.extend(parts("scenes", &contents.scenes, "shown", &shown));
     lines.extend([shapes(scene), triangles(scene), bounds(scene)]);
     lines.push(format!(
-        "overlap     {overlap} boxes for a ray, where most surfaces lie on each other"
+        "overlap     {} boxes for a ray, where most surfaces lie on each other",
+        overlap.boxes
     ));
     lines.push(format!("materials   {}", scene.materials.len()));
     lines.push(format!("textures    {}", textures(scene)));
@@ -49,7 +50,9 @@ fn describe(scene: &Scene, overlap: u64) -> String {
     lines.extend(parts("animations", &contents.animations, "played", &contents.played));
     lines.extend(deformations(scene));
     lines.extend(scene.notes.iter().map(|note| format!("note: {note}")));
-    lines.extend(scene.warnings.iter().map(|warning| format!("warning: {warning}")));
+    lines.extend(
+        scene.warnings.iter().chain(&overlap.warnings).map(|warning| format!("warning: {warning}")),
+    );
     lines.iter().map(|line| output::printable(line) + "\n").collect()
 }
 

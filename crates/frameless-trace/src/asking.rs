@@ -9,6 +9,7 @@ use crate::direct::Probe;
 use crate::integrator::Settings;
 use crate::many::SHADED;
 use crate::moment::Moment;
+use crate::numbers::mixed;
 use crate::point::Point;
 use crate::ray::Ray;
 use crate::traverse::Stack;
@@ -36,7 +37,7 @@ const BLOCKED: u32 = 4;
 /// How long lights are asked.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Patience {
-    /// In the order of the scene each so many'th is asked, the first included; and none any more
+    /// Of each so many in the order of the scene one is asked; and none any more
     pub(crate) stride: usize,
     /// once [`Stack::boxes`] is so many.
     pub(crate) until: u64,
@@ -52,10 +53,16 @@ pub(crate) enum Then {
     Draw(f32),
 }
 
-/// The numbers of all lights, first those that are asked.
+/// The numbers of all lights, first those that are asked: of each `stride` that follow each other one that is drawn, since each so many'th of a
+/// file may be all of one room.
 fn in_turn(all: usize, stride: usize) -> impl Iterator<Item = usize> + Clone {
-    let asked = (0..all).step_by(stride);
-    asked.chain((0..all).filter(move |light| light % stride != 0))
+    let of_group = move |group: usize| {
+        let first = group * stride;
+        let lights = stride.min(all - first);
+        first + if lights == 1 { 0 } else { mixed(group as u32) as usize % lights }
+    };
+    let asked = (0..all.div_ceil(stride)).map(of_group);
+    asked.chain((0..all).filter(move |&light| light != of_group(light / stride)))
 }
 
 /// Light that reaches a point.
@@ -246,7 +253,9 @@ impl World {
     ) -> [Asked; SHADED] {
         let mut asked = [Asked::NOBODY; SHADED];
         let all = moment.lights.len();
-        for (index, light) in moment.lights.iter().enumerate().step_by(self.efforts.stride) {
+        let stride = self.efforts.stride;
+        for index in in_turn(all, stride).take(all.div_ceil(stride)) {
+            let light = &moment.lights[index];
             let mut arriving = [None; SHADED];
             let (mut rays, mut count) = ([Ray::NONE; SHADED], 0);
             for (arriving, point) in arriving.iter_mut().zip(points) {
@@ -267,8 +276,8 @@ impl World {
                 }
             }
         }
-        if self.efforts.stride > 1 {
-            let others = in_turn(all, self.efforts.stride).skip(all.div_ceil(self.efforts.stride));
+        if stride > 1 {
+            let others = in_turn(all, stride).skip(all.div_ceil(stride));
             for (asked, point) in asked.iter_mut().zip(points) {
                 let Some(point) = point else { continue };
                 let share = asked.share(Vec3A::ONE);
@@ -276,5 +285,26 @@ impl World {
             }
         }
         asked
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_light_has_its_turn_and_those_that_are_asked_are_of_no_kind() {
+        for (all, stride) in [(60, 1), (60, 2), (61, 4), (7, 3), (300, 80), (1, 5), (0, 2)] {
+            let turns: Vec<usize> = in_turn(all, stride).collect();
+            let mut sorted = turns.clone();
+            sorted.sort_unstable();
+            assert!(sorted.into_iter().eq(0..all), "{turns:?}");
+            let asked = &turns[..all.div_ceil(stride)];
+            assert!(asked.iter().enumerate().all(|(k, light)| light / stride == k), "{asked:?}");
+            if asked.len() > 10 {
+                let odd = asked.iter().filter(|&light| light % 2 == 1).count();
+                assert!(odd * 4 > asked.len() && odd * 4 < asked.len() * 3, "{odd} of {asked:?}");
+            }
+        }
     }
 }

@@ -35,6 +35,15 @@ struct Crowd {
     secs: f64,
 }
 
+/// What [`World::check_overlap`] says of a world that may be drawn.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Overlap {
+    /// That a ray has to ask where most surfaces lie on top of each other, at a few moments. Rooms have 2 to 100.
+    pub boxes: u64,
+    /// What is not quite as it ought to be in pictures, or slow.
+    pub warnings: Vec<String>,
+}
+
 /// What is known of a world that may be drawn.
 #[derive(Clone, Debug, Default)]
 struct Weighed {
@@ -54,19 +63,41 @@ impl World {
     pub fn open(file: &str, scene: Arc<Scene>, limits: &Limits) -> Result<World, LoadError> {
         let mut world = World::new(scene);
         let weighed = world.weigh(file, limits)?;
-        world.efforts = world.efforts_for(file, limits, &weighed.forecasts);
+        for warning in world.overlap(&weighed, limits).warnings {
+            log::warn!("{file}: {warning}");
+        }
+        world.efforts = world.efforts_for(limits, &weighed.forecasts);
         for (deforming, price) in world.deforming.iter_mut().zip(weighed.prices) {
             deforming.price = price;
         }
         Ok(world)
     }
 
-    /// Boxes that a ray has to ask where most surfaces lie on top of each other, at a few moments. Rooms have 2 to 100.
+    /// What [`World::open`] finds out.
     ///
     /// # Errors
     /// As of [`World::open`].
-    pub fn check_overlap(&self, file: &str, limits: &Limits) -> Result<u64, LoadError> {
-        Ok(self.weigh(file, limits)?.densest.map_or(0, |crowd| crowd.boxes as u64))
+    pub fn check_overlap(&self, file: &str, limits: &Limits) -> Result<Overlap, LoadError> {
+        Ok(self.overlap(&self.weigh(file, limits)?, limits))
+    }
+
+    fn overlap(&self, weighed: &Weighed, limits: &Limits) -> Overlap {
+        let boxes = weighed.densest.map_or(0, |crowd| crowd.boxes as u64);
+        let mut warnings = Vec::new();
+        if boxes > Limits::default().overlap {
+            warnings.push(format!(
+                "surfaces lie on top of each other, or nearly so: a ray has about {boxes} boxes to ask, and pictures may take long"
+            ));
+        }
+        let lights = self.scene().lights.len();
+        let stride = self.efforts_for(limits, &weighed.forecasts).stride;
+        if stride > 1 {
+            let asked = lights.div_ceil(stride);
+            warnings.push(format!(
+                "pictures would take long: of {lights} lights {asked} are asked what stands before them; --max-overlap raises that"
+            ));
+        }
+        Overlap { boxes, warnings }
     }
 
     fn weigh(&self, file: &str, limits: &Limits) -> Result<Weighed, LoadError> {
@@ -86,14 +117,6 @@ impl World {
             let forecasts = self.forecasts(&moment);
             forecasts.iter().try_for_each(|one| self.allow(one, limits)).map_err(refused)?;
             weighed.forecasts.extend(forecasts);
-        }
-        if let Some(crowd) = weighed.densest
-            && crowd.boxes as u64 > Limits::default().overlap
-        {
-            let boxes = crowd.boxes as u64;
-            log::warn!(
-                "{file}: surfaces lie on top of each other, or nearly so: a ray has about {boxes} boxes to ask, and pictures may take long"
-            );
         }
         Ok(weighed)
     }
@@ -141,15 +164,9 @@ impl World {
     }
 
     /// So that pictures of these take no longer than they may.
-    fn efforts_for(&self, file: &str, limits: &Limits, forecasts: &[Forecast]) -> Efforts {
+    fn efforts_for(&self, limits: &Limits, forecasts: &[Forecast]) -> Efforts {
         let (lights, most) = (self.scene().lights.len(), most_per_sample(limits));
         let stride = forecasts.iter().map(|one| one.stride(lights, most)).max().unwrap_or(1);
-        if stride > 1 {
-            let asked = lights.div_ceil(stride);
-            log::warn!(
-                "{file}: pictures would take long: of {lights} lights {asked} are asked what stands before them; --max-overlap raises that"
-            );
-        }
         let usual = Efforts::default();
         let direct = forecasts.iter().map(|one| one.direct(stride, most)).min();
         let path = forecasts.iter().map(|one| one.path(lights, most)).min();

@@ -17,7 +17,7 @@ use glam::{Vec3, Vec3A};
 use crate::asking::{Asked, Patience, Then};
 use crate::first::FirstSurface;
 use crate::fresnel::refracted;
-use crate::holes::{Chance, attenuation};
+use crate::holes::{Chance, attenuation, looks};
 use crate::integrator::Settings;
 use crate::many::SHADED;
 use crate::moment::Moment;
@@ -44,7 +44,7 @@ const LEAST_SHOWN: f32 = 1.0 / 512.0;
 /// Surfaces that blend behind which all is looked at, however little of it is seen. Hair has a dozen more, of which nothing is.
 const CLEAR_LAYERS: u32 = 4;
 
-/// A surface that is shaded takes as long as so many boxes, see [`Stack::boxes`].
+/// A surface that is shaded takes as long as so many boxes, see [`Stack::boxes`], and its [textures](looks).
 const SURFACE: u64 = 50;
 
 /// Is told what happens to a ray; see [`crate::explain`].
@@ -131,6 +131,7 @@ impl World {
     ) -> [u64; 3] {
         let begin = stack.boxes;
         let met = self.nearest(moment, &ray, || Chance::Never, stack);
+        stack.boxes += met.as_ref().map_or(0, |hit| looks(self, hit));
         let there = stack.boxes;
         let (mut picture, probe) = (Picture::new(ray, cone, settings), &mut NoProbe);
         let goes_on = self.see(moment, &mut picture, met.as_ref(), settings, stack, probe);
@@ -217,6 +218,7 @@ impl World {
                 false => self.nearest(moment, &ray, || Chance::Never, stack),
                 true => self.behind_back(moment, &ray, || Chance::Never, stack),
             };
+            stack.boxes += met.as_ref().map_or(0, |hit| looks(self, hit));
             goes_on = self.see(moment, picture, met.as_ref(), settings, stack, probe);
         }
     }

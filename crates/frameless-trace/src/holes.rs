@@ -24,9 +24,11 @@ const MOST_ASKED: u32 = 256;
 /// The same of a ray to a light: so many of all rays from one point, but of each no fewer than the first and no more than the second.
 const MOST_ASKED_OF_LIGHTS: u32 = 512;
 const ASKED_OF_LIGHT: [u32; 2] = [4, 128];
-/// A hole that is asked about takes as long as so many boxes, for a look-up in a texture; one in glass as so many of these.
+/// A hole that is asked about takes as long as so many boxes, for a look-up in a texture; one in glass as so many of these, and so
+/// many more for each texture, most of whose texels are far apart in memory.
 const HOLE: u64 = 8;
 const GLASS: u32 = 3;
+const TEXTURE: u32 = 2;
 
 /// How a surface that blends decides whether it is there.
 #[derive(Clone, Copy, Debug)]
@@ -302,7 +304,8 @@ impl Sieve for Shade<'_> {
     }
 
     fn stops(&mut self, hit: &Hit) -> bool {
-        let Some((mesh, material)) = surface(self.world, hit) else { return true };
+        let Some((mesh, number)) = made_of(self.world, hit) else { return true };
+        let material = &self.world.scene().materials[number];
         let is_clear = material.layers.as_ref().is_some_and(|layers| layers.transmission > 0.0);
         let lets_pass = self.through_glass && is_clear;
         if material.alpha_mode == AlphaMode::Opaque && !lets_pass {
@@ -315,7 +318,8 @@ impl Sieve for Shade<'_> {
         let (patch, color) = looked_at(self.moment, mesh, hit);
         let coverage = coverage(self.world, material, &patch, color);
         if counts(self.moment, hit) {
-            self.counted += if lets_pass { GLASS } else { 1 };
+            self.counted +=
+                if lets_pass { GLASS + TEXTURE * self.world.textures[number] } else { 1 };
         }
         let through = if lets_pass && coverage > 0.0 {
             let place = Placement::new(self.world, self.moment, self.ray, hit);
@@ -373,15 +377,25 @@ pub(crate) fn has_no_back(world: &World, hit: &Hit) -> bool {
 
 /// `None` for spheres, which have no holes and no backs.
 fn surface<'a>(world: &'a World, hit: &Hit) -> Option<(&'a Mesh, &'a Material)> {
+    let (mesh, number) = made_of(world, hit)?;
+    Some((mesh, &world.scene().materials[number]))
+}
+
+/// With the material's number.
+fn made_of<'a>(world: &'a World, hit: &Hit) -> Option<(&'a Mesh, usize)> {
     let scene = world.scene();
     let geometry = scene.instances[hit.instance as usize].geometry;
     match &scene.geometries[geometry as usize] {
         Geometry::Sphere { .. } => None,
         Geometry::Mesh(mesh) => {
-            let material = mesh.triangle_materials[hit.primitive as usize];
-            Some((mesh, &scene.materials[material as usize]))
+            Some((mesh, mesh.triangle_materials[hit.primitive as usize] as usize))
         }
     }
+}
+
+/// What a surface takes to be shaded, in [boxes](Stack::boxes), besides what all do: its textures.
+pub(crate) fn looks(world: &World, hit: &Hit) -> u64 {
+    made_of(world, hit).map_or(0, |(_, number)| HOLE * u64::from(TEXTURE * world.textures[number]))
 }
 
 /// In [0, 1), by a number and a triangle.
@@ -393,10 +407,13 @@ fn unit(number: u32, hit: &Hit) -> f32 {
 mod tests {
     use std::sync::Arc;
 
+    use frameless_scene::Layers;
     use glam::{Vec3, Vec4};
 
     use super::*;
+    use crate::integrator::Settings;
     use crate::test_scenes as scenes;
+    use crate::texture::Cone;
 
     /// Masked sheets of which nothing is there, above a floor, which is the first instance.
     fn sheets(count: u32) -> World {
@@ -414,6 +431,34 @@ mod tests {
             scenes::add(&mut scene, scenes::floor(1.0, 0.0, solid + 1), place);
         }
         World::new(Arc::new(scene))
+    }
+
+    /// Light goes through a pane of glass, and a ray mirrored by it.
+    #[test]
+    fn textures_are_in_what_a_sample_takes() {
+        let mut scene = scenes::empty();
+        let layers = Layers { transmission: 0.9, ..Layers::default() };
+        scene.materials.push(Material {
+            double_sided: true,
+            layers: Some(Box::new(layers)),
+            ..Material::default()
+        });
+        scenes::add(&mut scene, scenes::floor(1.0, 0.0, 0), scenes::at(0.0, 0.0, 0.0));
+        let mut world = World::new(Arc::new(scene));
+        let moment = world.moment(0.0);
+        let ray = Ray { origin: Vec3A::new(0.1, 1.0, 0.2), direction: Vec3A::NEG_Y };
+        let took = |world: &World| {
+            let stack = &mut Stack::new();
+            let passes = world.passing(&moment, &ray, 2.0, true, stack);
+            assert_ne!(passes, Vec3A::ZERO);
+            let light = stack.boxes;
+            let cone = Cone { width_m: 0.0, spread: 0.0 };
+            let seen = world.effort_of(&moment, (ray, cone), &Settings::default(), stack);
+            [light, seen[0]]
+        };
+        let [light, seen] = took(&world);
+        world.textures = vec![14];
+        assert_eq!(took(&world), [light, seen].map(|boxes| boxes + 14 * HOLE * u64::from(TEXTURE)));
     }
 
     #[test]

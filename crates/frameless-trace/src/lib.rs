@@ -77,6 +77,7 @@ mod test_scenes;
 pub use camera::{Camera, ViewSource};
 pub use cast::Caster;
 pub use cpu::{CpuTracer, Viewpoint, thread_pool};
+pub use crowd::Overlap;
 pub use explain::explain;
 pub use integrator::{Integrator, Settings};
 pub use lens::Lens;

@@ -34,6 +34,8 @@ pub struct World {
     pub(crate) copies: Copies,
     /// Per material, see [`is_plain`].
     pub(crate) is_plain: Vec<bool>,
+    /// Per material: how many textures are looked up to know all of it.
+    pub(crate) textures: Vec<u32>,
     /// Per geometry: whether rays may pass some of its triangles.
     pub(crate) holes: Vec<bool>,
     /// Whether any has.
@@ -87,6 +89,7 @@ impl World {
             emitters: Emitters::new(&scene),
             surroundings: scene.environment.as_ref().map(Surroundings::new),
             copies,
+            textures: scene.materials.iter().map(|m| m.textures().count() as u32).collect(),
             is_plain: scene.materials.iter().map(|m| is_plain(&scene, m)).collect(),
             scene,
             isa,
