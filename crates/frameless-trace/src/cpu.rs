@@ -10,7 +10,7 @@ use crate::crew::{Crew, Work};
 use crate::integrator::Settings;
 use crate::latest::Latest;
 use crate::moment::Moment;
-use crate::order::by_tile;
+use crate::order::Order;
 use crate::traverse::Stack;
 use crate::world::World;
 
@@ -59,7 +59,7 @@ type Piece = Vec<([f32; 3], Surface)>;
 struct Workspace {
     /// Its own, but for a scene that has a [`Latest`]: that moment is let go when the batch is finished.
     moment: Option<Arc<Moment>>,
-    order: Vec<u32>,
+    order: Order,
     /// Of each piece, in the order of `order`.
     samples: Vec<Mutex<Piece>>,
 }
@@ -234,7 +234,7 @@ impl Work for Task {
         let Batch { scene_secs, requests, size, .. } = &self.batch;
         let latest = self.latest.as_deref();
         let mut workspace = take_workspace(&self.idle, &self.world, *scene_secs, latest);
-        by_tile(requests, *size, &mut workspace.order);
+        workspace.order.by_tile(requests, *size);
         if workspace.samples.len() < self.pieces() {
             workspace.samples.resize_with(self.pieces(), Mutex::default);
         }
@@ -243,7 +243,8 @@ impl Work for Task {
 
     fn piece(&self, number: usize, stack: &mut Stack) {
         let workspace = self.workspace();
-        let (moment, order, samples) = (workspace.moment(), &workspace.order, &workspace.samples);
+        let (moment, order, samples) =
+            (workspace.moment(), workspace.order.requests(), &workspace.samples);
         let camera = self.camera();
         let mut samples = lock(&samples[number]);
         samples.clear();
@@ -272,12 +273,13 @@ impl Workspace {
         piece: usize,
         settings: &Settings,
     ) -> (Vec<[f32; 3]>, Vec<Surface>) {
-        let mut rgb = vec![[0.0; 3]; self.order.len()];
+        let order = self.order.requests();
+        let mut rgb = vec![[0.0; 3]; order.len()];
         let mut surfaces = Vec::new();
         if settings.surfaces {
-            surfaces.resize(self.order.len(), Surface::default());
+            surfaces.resize(order.len(), Surface::default());
         }
-        for (requests, samples) in self.order.chunks(piece).zip(&mut self.samples) {
+        for (requests, samples) in order.chunks(piece).zip(&mut self.samples) {
             let samples = samples.get_mut().unwrap_or_else(PoisonError::into_inner);
             for (&request, &(colour, surface)) in requests.iter().zip(&*samples) {
                 rgb[request as usize] = colour;

@@ -13,7 +13,7 @@ use crate::lens::{self, Lens};
 use crate::many::{SHADED, WAVE};
 use crate::moment::Moment;
 use crate::numbers::Numbers;
-use crate::order::by_tile;
+use crate::order::Order;
 use crate::ray::Ray;
 use crate::traverse::Stack;
 use crate::world::World;
@@ -97,12 +97,12 @@ impl World {
         requests: &[Request],
         settings: &Settings,
     ) -> (Vec<[f32; 3]>, Vec<Surface>) {
-        let mut order = Vec::new();
-        by_tile(requests, size, &mut order);
+        let mut order = Order::default();
+        order.by_tile(requests, size);
         let mut rgb = vec![[0.0; 3]; requests.len()];
         let count = if settings.surfaces { requests.len() } else { 0 };
         let mut surfaces = vec![Surface::default(); count];
-        let mut places = order.iter().map(|&index| index as usize);
+        let mut places = order.requests().iter().map(|&index| index as usize);
         let put = |colour, surface| {
             let place = places.next().expect("as many answers as requests");
             rgb[place] = colour;
@@ -110,7 +110,7 @@ impl World {
                 *to = surface;
             }
         };
-        let sorted = order.iter().map(|&index| requests[index as usize]);
+        let sorted = order.requests().iter().map(|&index| requests[index as usize]);
         let seen = (moment, &Camera::new(view, size));
         self.samples(seen, sorted, settings, &mut Stack::new(), put);
         (rgb, surfaces)

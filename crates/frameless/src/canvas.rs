@@ -1,9 +1,10 @@
 //! The samples kept: the newest of every pixel.
 
 use crate::pages::await_large_pages;
+use crate::replaced::Before;
 use crate::traced::{Mark, TileMarks, Traced};
 use crate::wide;
-use crate::{Size, Time};
+use crate::{Request, Size, Time};
 
 /// The newest sample of every pixel: its linear colour and its time.
 #[derive(Clone, Debug, PartialEq)]
@@ -214,11 +215,30 @@ impl Canvas {
         self.samples.get(pixel as usize).is_some_and(|&samples| samples > 0)
     }
 
-    /// A sample has been added to those of a pixel at rest; returns the time and colour of the one at its centre, which stays.
-    pub(crate) fn refine(&mut self, pixel: u32) -> (Time, [f32; 3]) {
-        let i = pixel as usize;
-        self.samples[i] = self.samples[i].saturating_add(1);
-        (self.time_of(pixel), self.rgb[i])
+    /// A sample: added to those of a pixel at rest, of which the colour and time of the one at its centre stay; else it takes the place of
+    /// what is there, if that is not newer. `old`: that colour. Returns what the pixel was.
+    #[inline(always)]
+    pub(crate) fn put(
+        &mut self,
+        request: &Request,
+        time: Time,
+        rgb: [f32; 3],
+        old: &mut [f32; 3],
+    ) -> Before {
+        let pixel = request.pixel;
+        let (i, place) = (pixel as usize, self.traced.place(pixel));
+        let mark = self.traced.mark(place);
+        let (previous, known) = (self.traced.time(mark), mark.is_known());
+        *old = self.rgb[i];
+        let is_newer = time < previous;
+        let is_refinement = !is_newer && request.sample_index > 0 && self.rests(pixel);
+        if is_refinement {
+            self.samples[i] = self.samples[i].saturating_add(1);
+        } else if !is_newer {
+            self.traced.set(place, time);
+            self.rgb[i] = rgb;
+        }
+        Before { previous, known, is_refinement, is_newer }
     }
 
     /// Becomes a copy of a canvas as far as a reconstruction changes what is there; it replaces all else but the colours.
@@ -244,14 +264,12 @@ impl Canvas {
         self.traced.set(self.traced.place(pixel), time);
     }
 
-    /// Write a sample; returns the time and colour that it replaces.
-    #[inline]
+    /// Puts a sample at a pixel's centre there; returns the time and colour that it replaces.
+    #[cfg(test)]
     pub(crate) fn replace(&mut self, pixel: u32, time: Time, rgb: [f32; 3]) -> (Time, [f32; 3]) {
-        let (i, place) = (pixel as usize, self.traced.place(pixel));
-        let replaced = (self.traced.time(self.traced.mark(place)), self.rgb[i]);
-        self.traced.set(place, time);
-        self.rgb[i] = rgb;
-        replaced
+        let mut old = rgb;
+        let before = self.put(&Request::centre(pixel), time, rgb, &mut old);
+        (before.previous, old)
     }
 
     /// The same picture in another size: every pixel takes the sample nearest to its centre, age included.

@@ -6,7 +6,7 @@
 use std::hint::select_unpredictable;
 
 use crate::tone_map::{ToneMap, neutral_of_eight};
-use crate::wide::{F8, Unit};
+use crate::wide::{self, F8, Task, Unit};
 
 /// How linear radiance becomes a display colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,27 +99,45 @@ impl Display {
         r + g + b
     }
 
-    /// [`Display::change`] of many pairs. `squares` is scratch memory.
-    ///
-    /// One loop over plain numbers without branches: the compiler turns it into vector instructions, which halves
-    /// the loop's serial part.
-    pub(crate) fn changes<'a>(
-        &self,
-        new: &[[f32; 3]],
-        old: &[[f32; 3]],
-        squares: &'a mut Vec<f32>,
-    ) -> impl Iterator<Item = f32> + 'a {
-        squares.clear();
-        if self.tone_map == ToneMap::None {
-            let pairs = new.as_flattened().iter().zip(old.as_flattened());
-            let encode = |channel: f32| srgb_from_linear(channel * self.gain);
-            squares.extend(pairs.map(|(&new, &old)| squared(encode(new) - encode(old))));
-        } else {
-            let channels = |rgb: &[f32; 3]| self.encode_mapped(*rgb);
-            let pairs = new.iter().flat_map(channels).zip(old.iter().flat_map(channels));
-            squares.extend(pairs.map(|(new, old)| squared(new - old)));
+    /// [`Display::change`] of many pairs, put behind `changes`.
+    pub(crate) fn changes(&self, new: &[[f32; 3]], old: &[[f32; 3]], changes: &mut Vec<f32>) {
+        wide::run(Changes { display: self, new, old, changes });
+    }
+}
+
+/// See [`Display::changes`].
+struct Changes<'a> {
+    display: &'a Display,
+    new: &'a [[f32; 3]],
+    old: &'a [[f32; 3]],
+    changes: &'a mut Vec<f32>,
+}
+
+impl Task for Changes<'_> {
+    #[inline(always)]
+    fn run<U: Unit>(self) {
+        let Changes { display, new, old, changes } = self;
+        let ((new, new_rest), (old, old_rest)) = (new.as_chunks(), old.as_chunks());
+        for (new, old) in new.iter().zip(old) {
+            changes.extend_from_slice(&display.eight_changes::<U>(new, old));
         }
-        squares.chunks_exact(3).map(|d| d[0] + d[1] + d[2])
+        for (&new, &old) in new_rest.iter().zip(old_rest) {
+            changes.push(display.change(new, old));
+        }
+    }
+}
+
+impl Display {
+    #[inline(always)]
+    fn eight_changes<U: Unit>(&self, new: &[[f32; 3]; 8], old: &[[f32; 3]; 8]) -> [f32; 8] {
+        let [new, old] = [F8::<U>::of_triples(new), F8::of_triples(old)];
+        let (new, old) = (self.encode_eight(new), self.encode_eight(old));
+        let mut sum = F8::splat(0.0);
+        for k in 0..3 {
+            let difference = new[k] - old[k];
+            sum = sum + difference * difference;
+        }
+        sum.lanes()
     }
 }
 
@@ -210,8 +228,8 @@ mod tests {
         let (new, old) = (colours(), colours());
         for tone_map in ToneMap::ALL {
             let display = Display::new(0.5).with_tone_map(tone_map);
-            let mut squares = Vec::new();
-            let many: Vec<f32> = display.changes(&new, &old, &mut squares).collect();
+            let mut many = Vec::new();
+            display.changes(&new, &old, &mut many);
             let single = new.iter().zip(&old).map(|(&new, &old)| display.change(new, old));
             assert_eq!(many, single.collect::<Vec<_>>());
         }

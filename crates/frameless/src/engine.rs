@@ -102,8 +102,29 @@ pub enum EngineError {
     },
 }
 
-/// So many samples later what is prefetched is used.
-const AHEAD: usize = 16;
+impl Answer {
+    /// The first sample that cannot be kept, and why.
+    fn first_bad(&self) -> Option<(usize, EngineError)> {
+        let pixels = self.size.pixels();
+        let is_good = |(request, rgb): (&Request, &[f32; 3])| {
+            ((request.pixel as usize) < pixels)
+                & rgb.iter().fold(true, |all, c| all & c.is_finite())
+        };
+        let samples = || self.requests.iter().zip(&self.rgb);
+        // Without a way out, which lets several be looked at at once.
+        if samples().fold(true, |all, sample| all & is_good(sample)) {
+            return None;
+        }
+        let index = samples().position(|sample| !is_good(sample))?;
+        let (pixel, rgb) = (self.requests[index].pixel, self.rgb[index]);
+        let Size { width, height } = self.size;
+        let error = match self.size.xy(pixel) {
+            _ if pixel as usize >= pixels => EngineError::NoSuchPixel { pixel, width, height },
+            (x, y) => EngineError::NotFinite { x, y, scene_secs: self.scene_secs, rgb },
+        };
+        Some((index, error))
+    }
+}
 
 /// Batches under way at once on the real clock: while one is traced the next is chosen.
 const PIPELINE_DEPTH: usize = 2;
@@ -340,9 +361,6 @@ impl<T: Tracer> Engine<T> {
     }
 
     /// Writes an answer to the canvas and notes what each sample replaced.
-    ///
-    /// Only memory is moved here, and fetched some samples ahead; what the samples changed is worked out afterwards from
-    /// `replaced`, which lies in the cache.
     fn keep(&mut self, answer: &Answer) -> Result<(), EngineError> {
         self.replaced.clear();
         let (requests, colours) = (answer.requests.len(), answer.rgb.len());
@@ -350,41 +368,16 @@ impl<T: Tracer> Engine<T> {
         if colours != requests || (surfaces != requests && surfaces != 0) {
             return Err(EngineError::WrongLength { requests, colours, surfaces });
         }
-        let size = self.canvas.size();
-        if answer.size != size {
+        if answer.size != self.canvas.size() {
             self.counters.dropped += requests as u64;
             return Ok(());
         }
-        for (i, (request, &rgb)) in answer.requests.iter().zip(&answer.rgb).enumerate() {
-            if let Some(later) = answer.requests.get(i + AHEAD) {
-                self.canvas.prefetch(later.pixel);
-            }
-            let pixel = request.pixel;
-            if pixel as usize >= size.pixels() {
-                let Size { width, height } = size;
-                return Err(EngineError::NoSuchPixel { pixel, width, height });
-            }
-            if !rgb.iter().all(|c| c.is_finite()) {
-                let (x, y) = size.xy(pixel);
-                return Err(EngineError::NotFinite { x, y, scene_secs: answer.scene_secs, rgb });
-            }
-            if answer.now < self.canvas.time_of(pixel) {
-                self.counters.dropped += 1;
-                continue;
-            }
-            let known = self.canvas.is_known(pixel);
-            let is_refinement = request.sample_index > 0 && self.canvas.rests(pixel);
-            let (previous, old) = match is_refinement {
-                true => self.canvas.refine(pixel),
-                false => self.canvas.replace(pixel, answer.now, rgb),
-            };
-            self.replaced.requests.push(*request);
-            self.replaced.before.push(Before { previous, known, is_refinement });
-            self.replaced.old.push(old);
-            self.replaced.new.push(rgb);
-            self.replaced.surfaces.extend(answer.surfaces.get(i));
-        }
-        Ok(())
+        let (good, outcome) = match answer.first_bad() {
+            Some((index, error)) => (index, Err(error)),
+            None => (requests, Ok(())),
+        };
+        self.counters.dropped += self.replaced.put(answer, good, &mut self.canvas) as u64;
+        outcome
     }
 
     /// Tells the sampler what the samples just kept have changed: later, if the reconstruction, which says so, is away or has others to

@@ -1,6 +1,9 @@
 //! The samples of one answer and what they took the place of.
 
-use crate::{Kept, Request, Size, Surface, Time};
+use crate::{Answer, Canvas, Kept, Request, Size, Surface, Time};
+
+/// So many samples later what is prefetched is used.
+const AHEAD: usize = 32;
 
 /// In the answer's order; what has been dropped is not among them.
 #[derive(Default)]
@@ -21,6 +24,8 @@ pub(crate) struct Before {
     pub(crate) known: bool,
     /// Whether the sample was added to others, so that none was replaced.
     pub(crate) is_refinement: bool,
+    /// Whether that was later than the sample, which is not kept.
+    pub(crate) is_newer: bool,
 }
 
 impl Replaced {
@@ -30,6 +35,47 @@ impl Replaced {
         self.old.clear();
         self.new.clear();
         self.surfaces.clear();
+    }
+
+    /// Puts the first `count` samples of an answer on the canvas, and notes what each replaced. Returns how many came too late.
+    ///
+    /// Memory that is emptied before. Only memory is moved here, and fetched some samples ahead; what the samples changed is worked out
+    /// afterwards, from what is noted here.
+    pub(crate) fn put(&mut self, answer: &Answer, count: usize, canvas: &mut Canvas) -> usize {
+        let samples = &answer.requests[..count];
+        self.requests.extend_from_slice(samples);
+        self.new.extend_from_slice(&answer.rgb[..count]);
+        self.surfaces.extend(answer.surfaces.iter().take(count));
+        self.old.resize(count, [0.0; 3]);
+        let mut late = 0;
+        let replaced = samples.iter().zip(&answer.rgb).zip(&mut self.old).enumerate();
+        self.before.extend(replaced.map(|(i, ((request, &rgb), old))| {
+            if let Some(later) = samples.get(i + AHEAD) {
+                canvas.prefetch(later.pixel);
+            }
+            let before = canvas.put(request, answer.now, rgb, old);
+            late += usize::from(before.is_newer);
+            before
+        }));
+        if late > 0 {
+            self.leave_out_late();
+        }
+        late
+    }
+
+    #[cold]
+    fn leave_out_late(&mut self) {
+        let before = std::mem::take(&mut self.before);
+        fn keep<T>(some: &mut Vec<T>, before: &[Before]) {
+            let mut before = before.iter();
+            some.retain(|_| before.next().is_some_and(|before| !before.is_newer));
+        }
+        keep(&mut self.requests, &before);
+        keep(&mut self.old, &before);
+        keep(&mut self.new, &before);
+        keep(&mut self.surfaces, &before);
+        self.before = before;
+        self.before.retain(|before| !before.is_newer);
     }
 
     /// As a reconstruction takes them.

@@ -66,6 +66,7 @@ pub(crate) trait Unit: Copy {
     fn four_columns(rows: [&[f32; 4]; 8]) -> [Self::F; 4];
     fn six_columns(rows: [&[f32; 6]; 8]) -> [Self::F; 6];
     fn triples(columns: [Self::F; 3]) -> [[f32; 3]; 8];
+    fn of_triples(triples: &[[f32; 3]; 8]) -> [Self::F; 3];
     fn to_bits(a: Self::F) -> Self::M;
     fn from_bits(a: Self::M) -> Self::F;
     fn add_f(a: Self::F, b: Self::F) -> Self::F;
@@ -212,6 +213,13 @@ impl<U: Unit> F8<U> {
     #[inline(always)]
     pub(crate) fn triples([a, b, c]: [Self; 3]) -> [[f32; 3]; 8] {
         U::triples([a.0, b.0, c.0])
+    }
+
+    /// The inverse of [`F8::triples`].
+    #[inline(always)]
+    pub(crate) fn of_triples(triples: &[[f32; 3]; 8]) -> [Self; 3] {
+        let [a, b, c] = U::of_triples(triples);
+        [F8(a), F8(b), F8(c)]
     }
 
     /// Lane by lane as in [`f32::to_bits`].
@@ -510,6 +518,7 @@ mod tests {
             self.results.extend(numbers.into_iter().chain(F8::six_columns(six)).map(bits));
             self.results.extend(F8::four_columns(rows.map(|row| &row.as_chunks().0[0])).map(bits));
             let triples = F8::triples([a, b, a - b]);
+            self.results.extend(F8::of_triples(&triples).map(bits));
             self.results.extend((0..3).map(|k| triples.map(|triple| triple[k].to_bits())));
             let wholes = [
                 mask,
@@ -548,7 +557,8 @@ mod tests {
             assert_eq!(portable, here);
             // By hand, so that not both are wrong alike.
             assert_eq!(f32::from_bits(here[0][3]), numbers[0][3] + numbers[1][3]);
-            assert_eq!(here[21 + 5], std::array::from_fn(|k| wholes[0][k] & wholes[1][k]));
+            assert_eq!(here[21 + 1], numbers[1].map(f32::to_bits));
+            assert_eq!(here[24 + 5], std::array::from_fn(|k| wholes[0][k] & wholes[1][k]));
         }
     }
 }

@@ -15,7 +15,6 @@ use crate::{Canvas, Display, Kept, Rates, Reconstruction, Refresh};
 /// See the module.
 #[derive(Default)]
 pub struct Filter {
-    squares: Vec<f32>,
     held: Vec<[f32; 3]>,
     picture: Vec<[f32; 3]>,
     contrast: Vec<f32>,
@@ -27,7 +26,7 @@ const LEAST_ERROR: f32 = 1e-4;
 
 impl Reconstruction for Filter {
     fn keep(&mut self, kept: &Kept<'_>, display: &Display, findings: &mut Findings) {
-        findings.changes.extend(display.changes(kept.new, kept.old, &mut self.squares));
+        display.changes(kept.new, kept.old, &mut findings.changes);
     }
 
     fn refresh(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas) {

@@ -6,13 +6,12 @@ use crate::{Canvas, Display, Kept, Reconstruction, Refresh};
 /// See the module.
 #[derive(Default)]
 pub struct Hold {
-    squares: Vec<f32>,
     picture: Vec<[f32; 3]>,
 }
 
 impl Reconstruction for Hold {
     fn keep(&mut self, kept: &Kept<'_>, display: &Display, findings: &mut Findings) {
-        findings.changes.extend(display.changes(kept.new, kept.old, &mut self.squares));
+        display.changes(kept.new, kept.old, &mut findings.changes);
     }
 
     fn refresh(&mut self, refresh: &Refresh<'_>, canvas: &mut Canvas) {

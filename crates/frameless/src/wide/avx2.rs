@@ -65,6 +65,27 @@ impl Unit for Avx2 {
     }
 
     #[inline(always)]
+    fn of_triples(triples: &[[f32; 3]; 8]) -> [__m256; 3] {
+        let from = triples.as_ptr().cast::<f32>();
+        unsafe {
+            // By halves: x0 y0 z0 x1; y1 z1 x2 y2; z2 x3 y3 z3.
+            let part = |k: usize| {
+                let low = _mm256_castps128_ps256(_mm_loadu_ps(from.add(4 * k)));
+                _mm256_insertf128_ps::<1>(low, _mm_loadu_ps(from.add(12 + 4 * k)))
+            };
+            let (first, second, third) = (part(0), part(1), part(2));
+            // x2 y2 x3 y3; y0 z0 y1 z1.
+            let xy = _mm256_shuffle_ps::<0b10_01_11_10>(second, third);
+            let yz = _mm256_shuffle_ps::<0b01_00_10_01>(first, second);
+            [
+                _mm256_shuffle_ps::<0b10_00_11_00>(first, xy),
+                _mm256_shuffle_ps::<0b11_01_10_00>(yz, xy),
+                _mm256_shuffle_ps::<0b11_00_11_01>(yz, third),
+            ]
+        }
+    }
+
+    #[inline(always)]
     fn to_bits(a: __m256) -> __m256i {
         unsafe { _mm256_castps_si256(a) }
     }

@@ -50,6 +50,11 @@ impl Unit for Portable {
     }
 
     #[inline(always)]
+    fn of_triples(triples: &[[f32; 3]; 8]) -> [[f32; 8]; 3] {
+        std::array::from_fn(|k| triples.map(|triple| triple[k]))
+    }
+
+    #[inline(always)]
     fn to_bits(a: [f32; 8]) -> [u32; 8] {
         a.map(f32::to_bits)
     }
