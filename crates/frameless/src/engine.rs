@@ -1,6 +1,7 @@
 //! THE LOOP: choose pixels → trace them now → keep the samples → observe what changed.
 
 use std::collections::VecDeque;
+use std::iter::repeat;
 use std::time::Duration;
 
 use thiserror::Error;
@@ -324,14 +325,14 @@ impl<T: Tracer> Engine<T> {
     ///
     /// # Errors
     /// As [`Engine::step`].
-    pub fn answer(&mut self, answer: Answer) -> Result<usize, EngineError> {
+    pub fn answer(&mut self, mut answer: Answer) -> Result<usize, EngineError> {
         if answer.batch < self.first_batch {
             // Of another canvas, even if that had this one's size.
             self.counters.dropped += answer.requests.len() as u64;
             self.observations.clear();
             return Ok(0);
         }
-        let outcome = self.keep(&answer);
+        let outcome = self.keep(&mut answer);
         let kept = self.replaced.requests.len();
         self.counters.kept += kept as u64;
         self.tell(answer.now);
@@ -360,8 +361,8 @@ impl<T: Tracer> Engine<T> {
         self.answer(answer).map(Some)
     }
 
-    /// Writes an answer to the canvas and notes what each sample replaced.
-    fn keep(&mut self, answer: &Answer) -> Result<(), EngineError> {
+    /// Writes an answer to the canvas and notes what each sample replaced; its samples are taken out of it.
+    fn keep(&mut self, answer: &mut Answer) -> Result<(), EngineError> {
         self.replaced.clear();
         let (requests, colours) = (answer.requests.len(), answer.rgb.len());
         let surfaces = answer.surfaces.len();
@@ -426,11 +427,16 @@ impl<T: Tracer> Engine<T> {
         self.observations.clear();
         let now = now.as_kept();
         let samples = replaced.requests.iter().zip(&replaced.before).zip(&findings.changes);
-        self.observations.extend(samples.enumerate().map(|(i, ((request, before), &change))| {
-            let refinement = findings.refinements.get(i).copied().flatten();
+        let told = |((request, before), change): ((&Request, &Before), &f32), refinement| {
             let Before { previous, known, .. } = *before;
-            Observation { pixel: request.pixel, now, previous, known, change, refinement }
-        }));
+            Observation { pixel: request.pixel, now, previous, known, change: *change, refinement }
+        };
+        if findings.refinements.is_empty() {
+            self.observations.extend(samples.map(|sample| told(sample, None)));
+        } else {
+            let refinements = findings.refinements.iter().copied().chain(repeat(None));
+            self.observations.extend(samples.zip(refinements).map(|(sample, r)| told(sample, r)));
+        }
         let told = match self.sampler.refines() {
             true => &self.observations,
             false => self.add_up.told(&self.observations),
@@ -568,7 +574,7 @@ impl<T: Tracer> Engine<T> {
     /// As [`Engine::step`].
     pub fn start_with(&mut self, answer: &Answer) -> Result<(), EngineError> {
         self.take_back();
-        self.keep(answer)?;
+        self.keep(&mut answer.clone())?;
         self.counters.kept += self.replaced.requests.len() as u64;
         self.observe(answer.now);
         Ok(())

@@ -39,16 +39,19 @@ impl Replaced {
 
     /// Puts the first `count` samples of an answer on the canvas, and notes what each replaced. Returns how many came too late.
     ///
-    /// Memory that is emptied before. Only memory is moved here, and fetched some samples ahead; what the samples changed is worked out
-    /// afterwards, from what is noted here.
-    pub(crate) fn put(&mut self, answer: &Answer, count: usize, canvas: &mut Canvas) -> usize {
-        let samples = &answer.requests[..count];
-        self.requests.extend_from_slice(samples);
-        self.new.extend_from_slice(&answer.rgb[..count]);
-        self.surfaces.extend(answer.surfaces.iter().take(count));
+    /// They are taken from the answer, which gets this memory, emptied before, for it. Only memory is moved here, and fetched some samples
+    /// ahead; what the samples changed is worked out afterwards, from what is noted here.
+    pub(crate) fn put(&mut self, answer: &mut Answer, count: usize, canvas: &mut Canvas) -> usize {
+        std::mem::swap(&mut self.requests, &mut answer.requests);
+        std::mem::swap(&mut self.new, &mut answer.rgb);
+        std::mem::swap(&mut self.surfaces, &mut answer.surfaces);
+        self.requests.truncate(count);
+        self.new.truncate(count);
+        self.surfaces.truncate(count);
         self.old.resize(count, [0.0; 3]);
         let mut late = 0;
-        let replaced = samples.iter().zip(&answer.rgb).zip(&mut self.old).enumerate();
+        let samples = &self.requests;
+        let replaced = samples.iter().zip(&self.new).zip(&mut self.old).enumerate();
         self.before.extend(replaced.map(|(i, ((request, &rgb), old))| {
             if let Some(later) = samples.get(i + AHEAD) {
                 canvas.prefetch(later.pixel);

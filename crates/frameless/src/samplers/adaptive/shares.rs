@@ -1,15 +1,22 @@
 //! Tiles drawn in proportion to their shares, exactly on average: of every [block](super::block) of 16, and then of the tiles in it.
 //!
 //! ```text
-//! got ← got + a · Σ w + b · Σ e     for every block, once per draw of a Σ w + b Σ e tiles
-//! if got ≥ g:   that many tiles of the block are drawn, got ← 0
+//! got ← got + s (a Σ w + b Σ e)     for every block, once per draw of n = a Σ w + b Σ e tiles
+//! of blocks with got ≥ h, and then of those with got ≥ g, all that they have got is drawn until there are n tiles, and got ← 0
 //! g = number of blocks / 100, in [1, 2.8]
+//! h = max(g, 2 n / number of blocks if n is at least the number of tiles, 0.8 h of the draw before)
+//! s: so that h/4 per block is given beforehand, once, where h > g
 //! ```
 //!
 //! So what a sweep looks at is a 16th of the tiles: in 4K that takes as long as in small pictures one over all of them. Blocks that get little are
-//! left alone meanwhile, and those drawn from are looked at once for several tiles. In small pictures most blocks have a draw or two per batch
-//! in any case; in large ones they wait for two or three, since each look at a block waits for memory. More at a time would be faster still, but then what
-//! a block has got is shared out by weights that have changed meanwhile.
+//! left alone meanwhile, and those drawn from are looked at once for several tiles. In large pictures they wait for two or three, since each look at a
+//! block waits for memory. More at a time would be faster still, but then what a block has got is shared out by weights that have changed meanwhile.
+//!
+//! Where a draw has a tile or more for each that there is, as with a fast renderer on the real clock, blocks with less than h are drawn from in the order
+//! of the picture, from where the draw before has ended on, and what was given beforehand has them wait for one another: a draw is about a sweep over
+//! two thirds of them. So its samples lie closer together: their rays meet the same nodes, and what is known of their tiles is in the cache. Blocks that
+//! get much wait for nobody. With fewer tiles per draw waiting would be felt: what changes would be seen later by a part of the time that it takes to
+//! look at it at all.
 
 use super::block::{BLOCK, Due, push_bits, sum};
 use crate::Rng;
@@ -22,6 +29,8 @@ const LANES: usize = 32;
 const MOST_AT_ONCE: f32 = 2.8;
 /// For every so many blocks (102,400 pixels) it waits for one more.
 const BLOCKS_PER_DRAW: f32 = 100.0;
+/// This part of h stays from draw to draw: where n is small for once, not all that waits is drawn at once.
+const MUCH_STAYS: f32 = 0.8;
 /// How many blocks ahead of the one at hand the next is fetched.
 const AHEAD: usize = 16;
 
@@ -64,6 +73,12 @@ pub(super) struct Shares {
     even_sum: f64,
     /// g.
     at_once: f32,
+    /// The first block of the next draw.
+    next: u32,
+    /// h.
+    much: f32,
+    /// What was given beforehand.
+    lent: f32,
     /// Blocks that are drawn from.
     due: Vec<u32>,
     /// Blocks of which a weight is another one now, room for all, and how many there are.
@@ -105,6 +120,9 @@ impl Shares {
             even,
             even_sum: 0.0,
             at_once,
+            next: 0,
+            much: 0.0,
+            lent: 0.0,
             due: Vec::new(),
             touched: vec![0; blocks + 1],
             count_touched: 0,
@@ -217,15 +235,37 @@ impl Shares {
 
     /// Appends the tiles that are drawn: a Σ w + b Σ e of them on average.
     pub(super) fn draw(&mut self, a: f32, b: f32, weights: &impl Weigh, tiles: &mut Vec<u32>) {
-        wide::run(Draw { shares: self, a, b, weights, tiles });
+        let sums = self.sums();
+        let count = a * sums.weight as f32 + b * sums.even as f32;
+        if !(count > 0.0) {
+            return;
+        }
+        let blocks = self.credit.lines() as f32;
+        let much = if count >= self.tiles as f32 { 2.0 * count / blocks } else { 0.0 };
+        self.much = self.at_once.max(much).max(MUCH_STAYS * self.much);
+        let lends = if self.much > self.at_once { self.much / 4.0 * blocks } else { 0.0 };
+        let given = (count + lends - self.lent).clamp(0.0, 2.0 * count);
+        self.lent += given - count;
+        let s = given / count;
+        wide::run(Draw {
+            shares: self,
+            gives: [s * a, s * b],
+            scale: [a, b],
+            count,
+            weights,
+            tiles,
+        });
     }
 }
 
 /// See [`Shares::draw`].
 struct Draw<'a, W> {
     shares: &'a mut Shares,
-    a: f32,
-    b: f32,
+    /// s a, s b.
+    gives: [f32; 2],
+    scale: [f32; 2],
+    /// n.
+    count: f32,
     weights: &'a W,
     tiles: &'a mut Vec<u32>,
 }
@@ -233,8 +273,9 @@ struct Draw<'a, W> {
 impl<W: Weigh> Task for Draw<'_, W> {
     #[inline(always)]
     fn run<U: Unit>(self) {
-        let Draw { shares, a, b, weights, tiles } = self;
-        shares.give::<U>(a, b);
+        let Draw { shares, gives, scale: [a, b], count, weights, tiles } = self;
+        // What those that do not wait leave for the others.
+        let mut left = count - shares.give::<U>(gives);
         for i in 0..shares.due.len() {
             if let Some(&later) = shares.due.get(i + AHEAD) {
                 shares.credit.prefetch(later as usize);
@@ -244,6 +285,17 @@ impl<W: Weigh> Task for Draw<'_, W> {
                 }
             }
             let block = shares.due[i] as usize;
+            let has = shares.got[block];
+            let mut got = has;
+            if has < shares.much {
+                if left <= 0.0 {
+                    continue;
+                }
+                got = has.min(left);
+                left -= got;
+                shares.next = block as u32 + u32::from(got == has);
+            }
+            shares.got[block] = has - got;
             // Who is not there is never drawn, whatever its weight.
             let [w_left, w_right] = weights.halves::<U>(block);
             let (per_weight, per_even) = (F8::splat(a), F8::splat(b));
@@ -255,7 +307,7 @@ impl<W: Weigh> Task for Draw<'_, W> {
                 }
             };
             let due = Due {
-                got: std::mem::take(&mut shares.got[block]),
+                got,
                 shares: [per_weight * w_left + e_left, per_weight * w_right + e_right],
                 sum: a * shares.weight[block] + b * shares.even[block],
                 first: (block * BLOCK) as u32,
@@ -266,10 +318,12 @@ impl<W: Weigh> Task for Draw<'_, W> {
 }
 
 impl Shares {
-    /// Gives all blocks what they get, and finds those that are drawn from.
+    /// Gives all blocks what they get, and finds those that are drawn from, in their order. Returns what those have that have got much.
     #[inline(always)]
-    fn give<U: Unit>(&mut self, a: f32, b: f32) {
+    fn give<U: Unit>(&mut self, [a, b]: [f32; 2]) -> f32 {
         let (a, b, at_once) = (F8::<U>::splat(a), F8::splat(b), F8::splat(self.at_once));
+        let (zero, much) = (F8::splat(0.0), F8::splat(self.much));
+        let mut many = zero;
         self.due.clear();
         for first in (0..self.got.len()).step_by(LANES) {
             let mut due = 0;
@@ -278,10 +332,14 @@ impl Shares {
                 let gets = a * F8::load(&self.weight, blocks) + b * F8::load(&self.even, blocks);
                 let got = F8::load(&self.got, blocks) + gets;
                 got.store(&mut self.got, blocks);
+                many = many + zero.or(got.less_than(much), got);
                 due |= got.less_than(at_once).not().bits() << eight;
             }
             push_bits(&mut self.due, first as u32, due);
         }
+        let before = self.due.partition_point(|&block| block < self.next);
+        self.due.rotate_left(before);
+        many.lanes().iter().sum()
     }
 }
 
@@ -346,11 +404,43 @@ mod tests {
             let weights: Vec<f32> = (0..tiles).map(|_| weight(&mut rng)).collect();
             shares.set_all(|tile| (weights[tile], 1.0));
             let (scale, mut counts) = (scale(&mut shares, 500.0), vec![0.0; tiles]);
+            let waited = shares.0.got.clone();
             (0..400).for_each(|_| _ = drawn(&mut shares, scale, &mut counts));
-            for (tile, want) in shares.all(scale.0, scale.1).into_iter().enumerate() {
-                let off = counts[tile] - 400.0 * f64::from(want);
+            let all = shares.all(scale.0, scale.1);
+            let per_block: Vec<f32> = all.chunks(BLOCK).map(|block| block.iter().sum()).collect();
+            // What a block waits for counts as if it had been drawn.
+            let waits = |block: usize| f64::from(shares.0.got[block] - waited[block]);
+            let waiting: f64 = (0..per_block.len()).map(waits).sum();
+            let draws = (counts.iter().sum::<f64>() + waiting) / 500.0;
+            assert!((draws - 400.0).abs() < 1.5, "{tiles}: {draws}");
+            for (tile, want) in all.into_iter().map(f64::from).enumerate() {
+                let block = tile / BLOCK;
+                let part = want / f64::from(per_block[block]);
+                let off = counts[tile] + waits(block) * part - draws * want;
                 assert!(off.abs() < 2.0 + 1e-4 * counts[tile], "{tile} of {tiles}: off by {off}");
             }
+        }
+    }
+
+    #[test]
+    fn a_draw_goes_on_where_the_one_before_has_ended() {
+        let (tiles, mut rng) = (3072, Rng::new(13));
+        let mut shares = Weighed::new(tiles, &mut rng);
+        shares.set_all(|_| (1.0, 1.0));
+        let scale = scale(&mut shares, 938.0);
+        let mut draw = || {
+            let mut tiles = Vec::new();
+            shares.0.draw(scale.0, scale.1, &shares.1, &mut tiles);
+            tiles
+        };
+        (0..20).for_each(|_| _ = draw());
+        let mut end = draw().last().copied();
+        for _ in 0..20 {
+            let (drawn, before) = (draw(), end);
+            end = drawn.last().copied();
+            let (first, before) = (drawn[0] / BLOCK as u32, before.expect("a tile") / BLOCK as u32);
+            assert!(first == before || first == (before + 1) % 192, "{first} after {before}");
+            assert!(drawn.len().abs_diff(938) < 100, "{}", drawn.len());
         }
     }
 
