@@ -46,6 +46,32 @@ pub(crate) fn union(a: Bounds, b: Bounds) -> Bounds {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
 
+/// 2²³: numbers from there on are whole, and their last bits count.
+const WHOLE: f32 = 8_388_608.0;
+
+/// A number in [0, 255], or the nearest that there is, and 0 for NaN; and the whole number nearest to it.
+#[inline(always)]
+fn near(x: f32) -> [f32; 2] {
+    let x = x.max(0.0).min(255.0);
+    [x, (x + WHOLE) - WHOLE]
+}
+
+/// Such a number, rounded down.
+#[inline(always)]
+fn down(x: f32) -> u8 {
+    let [x, near] = near(x);
+    let whole = if near > x { near - 1.0 } else { near };
+    (whole + WHOLE).to_bits() as u8
+}
+
+/// Such a number, rounded up.
+#[inline(always)]
+fn up(x: f32) -> u8 {
+    let [x, near] = near(x);
+    let whole = if near < x { near + 1.0 } else { near };
+    (whole + WHOLE).to_bits() as u8
+}
+
 /// Half the surface; 0 of nothing.
 #[inline(always)]
 pub(crate) fn half_area([low, high]: Bounds) -> f32 {
@@ -91,17 +117,20 @@ impl Node {
             self.step[axis] = step;
             // Rounding must not take away the room below.
             self.origin[axis] = (low - 2.0 * ROOM * step).min(low.next_down());
-            let [low, high] = [0, 1].map(|side| {
-                let planes: [f32; 8] = std::array::from_fn(|slot| boxes[slot][side][axis]);
-                planes.map(|plane| (plane - self.origin[axis]) * reciprocal)
-            });
-            // Casts go to the nearest number that there is, and to 0 from NaN.
-            self.counts[2 * axis] = low.map(|x| (x - ROOM) as u8);
-            self.counts[2 * axis + 1] = high.map(|x| {
-                let x = x + ROOM;
-                let whole = x as i32;
-                (whole + i32::from(x > whole as f32)) as u8
-            });
+            // A loop of its own for each step, without casts, which the compiler makes vectors of.
+            let (mut low, mut high) = ([0.0; 8], [0.0; 8]);
+            for (slot, bounds) in boxes.iter().enumerate() {
+                low[slot] = bounds[0][axis];
+                high[slot] = bounds[1][axis];
+            }
+            let origin = self.origin[axis];
+            let [low_counts, high_counts] = &mut self.counts.as_chunks_mut().0[axis];
+            for (count, plane) in low_counts.iter_mut().zip(low) {
+                *count = down((plane - origin) * reciprocal - ROOM);
+            }
+            for (count, plane) in high_counts.iter_mut().zip(high) {
+                *count = up((plane - origin) * reciprocal + ROOM);
+            }
         }
         around
     }
@@ -252,5 +281,17 @@ mod tests {
         assert!(node.plane(0, 1) <= 1.0 && node.plane(0, 1) > 0.99);
         let nowhere = Node::new(&[(NOTHING, Child::ROOT)]);
         assert!((0..6).all(|row| nowhere.plane(row, 0).abs() < 1e-27));
+    }
+
+    #[test]
+    fn bytes_are_what_casts_make_of_numbers() {
+        let mut rng = Rng::new(7);
+        let some = [-0.0, 0.5, 1.0, 254.0, 255.0, 255.5, 256.0, 1e30, -1e30, f32::INFINITY];
+        let more = [f32::NEG_INFINITY, f32::NAN, 254.0f32.next_up(), 3.0f32.next_down(), 2.5, 3.5];
+        let any = std::iter::from_fn(|| Some(280.0 * rng.unit_f32() - 12.0)).take(10_000);
+        for x in some.into_iter().chain(more).chain(any) {
+            assert_eq!(down(x), x as u8, "{x}");
+            assert_eq!(up(x), x.ceil() as u8, "{x}");
+        }
     }
 }

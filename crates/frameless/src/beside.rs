@@ -23,7 +23,6 @@ pub(crate) struct Work {
 
 /// The samples of one answer, and what they told.
 pub(crate) struct Told {
-    pub(crate) now: Time,
     pub(crate) replaced: Replaced,
     pub(crate) findings: Findings,
 }
@@ -143,12 +142,8 @@ impl Work {
         let kept = replaced.kept(now, self.canvas.size(), order.is_noisy);
         let mut findings = Findings::default();
         self.reconstruction.keep(&kept, &order.display, &mut findings);
-        for (request, before) in replaced.requests.iter().zip(&replaced.before) {
-            if !before.is_refinement {
-                self.canvas.note(request.pixel, now);
-            }
-        }
-        self.told.push_back(Told { now, replaced, findings });
+        replaced.newest().for_each(|pixel| self.canvas.note(pixel, now));
+        self.told.push_back(Told { replaced, findings });
     }
 }
 

@@ -1,14 +1,13 @@
 //! THE LOOP: choose pixels → trace them now → keep the samples → observe what changed.
 
 use std::collections::VecDeque;
-use std::iter::repeat;
 use std::time::Duration;
 
 use thiserror::Error;
 
 use crate::add_up::AddUp;
 use crate::beside::{Beside, Late, Order, Told, Work};
-use crate::replaced::{Before, Replaced};
+use crate::replaced::Replaced;
 use crate::{
     Answer, Batch, Canvas, Clock, Display, Findings, Hold, Kept, Lighting, Observation, Pose,
     Rates, Reconstruction, Refresh, Request, Sampler, Size, Time, Timeline, Tracer, Weights,
@@ -399,8 +398,8 @@ impl<T: Tracer> Engine<T> {
             }
         }
         for _ in 0..UNHEARD_PER_ANSWER {
-            let Some(Told { now, replaced, findings }) = self.unheard.pop_front() else { return };
-            self.hear(now, &replaced, &findings);
+            let Some(Told { mut replaced, findings }) = self.unheard.pop_front() else { return };
+            self.hear(&mut replaced, &findings);
             self.spare_replaced.push(replaced);
         }
     }
@@ -417,26 +416,16 @@ impl<T: Tracer> Engine<T> {
         self.findings.refinements.clear();
         let kept = self.replaced.kept(now, self.canvas.size(), self.tracer.is_noisy());
         self.reconstruction.keep(&kept, &self.display, &mut self.findings);
-        let (replaced, findings) =
+        let (mut replaced, findings) =
             (std::mem::take(&mut self.replaced), std::mem::take(&mut self.findings));
-        self.hear(now, &replaced, &findings);
+        self.hear(&mut replaced, &findings);
         (self.replaced, self.findings) = (replaced, findings);
     }
 
-    fn hear(&mut self, now: Time, replaced: &Replaced, findings: &Findings) {
-        self.observations.clear();
-        let now = now.as_kept();
-        let samples = replaced.requests.iter().zip(&replaced.before).zip(&findings.changes);
-        let told = |((request, before), change): ((&Request, &Before), &f32), refinement| {
-            let Before { previous, known, .. } = *before;
-            Observation { pixel: request.pixel, now, previous, known, change: *change, refinement }
-        };
-        if findings.refinements.is_empty() {
-            self.observations.extend(samples.map(|sample| told(sample, None)));
-        } else {
-            let refinements = findings.refinements.iter().copied().chain(repeat(None));
-            self.observations.extend(samples.zip(refinements).map(|(sample, r)| told(sample, r)));
-        }
+    fn hear(&mut self, replaced: &mut Replaced, findings: &Findings) {
+        replaced.told.iter_mut().zip(&findings.changes).for_each(|(told, &d)| told.change = d);
+        replaced.told.iter_mut().zip(&findings.refinements).for_each(|(t, &r)| t.refinement = r);
+        std::mem::swap(&mut self.observations, &mut replaced.told);
         let told = match self.sampler.refines() {
             true => &self.observations,
             false => self.add_up.told(&self.observations),
@@ -561,10 +550,8 @@ impl<T: Tracer> Engine<T> {
         self.unheard.extend(told);
         self.late = late;
         // The canvas that was away knows nothing of them.
-        for (now, Replaced { requests, before, .. }) in &self.late {
-            for (request, _) in requests.iter().zip(before).filter(|(_, b)| !b.is_refinement) {
-                self.canvas.note(request.pixel, *now);
-            }
+        for (now, replaced) in &self.late {
+            replaced.newest().for_each(|pixel| self.canvas.note(pixel, *now));
         }
     }
 

@@ -1,6 +1,6 @@
 //! The samples of one answer and what they took the place of.
 
-use crate::{Answer, Canvas, Kept, Request, Size, Surface, Time};
+use crate::{Answer, Canvas, Kept, Observation, Request, Size, Surface, Time};
 
 /// So many samples later what is prefetched is used.
 const AHEAD: usize = 32;
@@ -9,7 +9,10 @@ const AHEAD: usize = 32;
 #[derive(Default)]
 pub(crate) struct Replaced {
     pub(crate) requests: Vec<Request>,
-    pub(crate) before: Vec<Before>,
+    /// But for what they changed, which is found out later.
+    pub(crate) told: Vec<Observation>,
+    /// Whether each was added to others, so that none was replaced.
+    added: Vec<bool>,
     pub(crate) old: Vec<[f32; 3]>,
     pub(crate) new: Vec<[f32; 3]>,
     pub(crate) surfaces: Vec<Surface>,
@@ -31,7 +34,8 @@ pub(crate) struct Before {
 impl Replaced {
     pub(crate) fn clear(&mut self) {
         self.requests.clear();
-        self.before.clear();
+        self.told.clear();
+        self.added.clear();
         self.old.clear();
         self.new.clear();
         self.surfaces.clear();
@@ -49,16 +53,26 @@ impl Replaced {
         self.new.truncate(count);
         self.surfaces.truncate(count);
         self.old.resize(count, [0.0; 3]);
-        let mut late = 0;
+        self.added.resize(count, false);
+        let (now, mut late) = (answer.now.as_kept(), 0);
         let samples = &self.requests;
-        let replaced = samples.iter().zip(&self.new).zip(&mut self.old).enumerate();
-        self.before.extend(replaced.map(|(i, ((request, &rgb), old))| {
+        let replaced = samples.iter().zip(&self.new).zip(self.old.iter_mut().zip(&mut self.added));
+        self.told.extend(replaced.enumerate().map(|(i, ((request, &rgb), (old, added)))| {
             if let Some(later) = samples.get(i + AHEAD) {
                 canvas.prefetch(later.pixel);
             }
             let before = canvas.put(request, answer.now, rgb, old);
+            *added = before.is_refinement;
             late += usize::from(before.is_newer);
-            before
+            let Before { previous, known, .. } = before;
+            Observation {
+                pixel: request.pixel,
+                now,
+                previous,
+                known,
+                change: 0.0,
+                refinement: None,
+            }
         }));
         if late > 0 {
             self.leave_out_late();
@@ -68,17 +82,23 @@ impl Replaced {
 
     #[cold]
     fn leave_out_late(&mut self) {
-        let before = std::mem::take(&mut self.before);
-        fn keep<T>(some: &mut Vec<T>, before: &[Before]) {
-            let mut before = before.iter();
-            some.retain(|_| before.next().is_some_and(|before| !before.is_newer));
+        let is_late: Vec<bool> = self.told.iter().map(|told| told.previous > told.now).collect();
+        fn keep<T>(some: &mut Vec<T>, is_late: &[bool]) {
+            let mut is_late = is_late.iter();
+            some.retain(|_| is_late.next().is_some_and(|is_late| !is_late));
         }
-        keep(&mut self.requests, &before);
-        keep(&mut self.old, &before);
-        keep(&mut self.new, &before);
-        keep(&mut self.surfaces, &before);
-        self.before = before;
-        self.before.retain(|before| !before.is_newer);
+        keep(&mut self.requests, &is_late);
+        keep(&mut self.told, &is_late);
+        keep(&mut self.added, &is_late);
+        keep(&mut self.old, &is_late);
+        keep(&mut self.new, &is_late);
+        keep(&mut self.surfaces, &is_late);
+    }
+
+    /// The pixels of which the newest sample is among these.
+    pub(crate) fn newest(&self) -> impl Iterator<Item = u32> {
+        let pixels = self.requests.iter().map(|request| request.pixel);
+        pixels.zip(&self.added).filter(|(_, added)| !**added).map(|(pixel, _)| pixel)
     }
 
     /// As a reconstruction takes them.

@@ -237,7 +237,7 @@ impl Shares {
     pub(super) fn draw(&mut self, a: f32, b: f32, weights: &impl Weigh, tiles: &mut Vec<u32>) {
         let sums = self.sums();
         let count = a * sums.weight as f32 + b * sums.even as f32;
-        if !(count > 0.0) {
+        if count <= 0.0 || count.is_nan() {
             return;
         }
         let blocks = self.credit.lines() as f32;
