@@ -52,7 +52,8 @@ const WHOLE: f32 = 8_388_608.0;
 /// A number in [0, 255], or the nearest that there is, and 0 for NaN; and the whole number nearest to it.
 #[inline(always)]
 fn near(x: f32) -> [f32; 2] {
-    let x = x.max(0.0).min(255.0);
+    // Not clamped: NaN would stay.
+    let x = if x > 0.0 { x.min(255.0) } else { 0.0 };
     [x, (x + WHOLE) - WHOLE]
 }
 
