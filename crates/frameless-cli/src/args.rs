@@ -8,7 +8,7 @@ mod view;
 
 use std::path::PathBuf;
 
-use clap::{Args as ClapArgs, Parser, Subcommand};
+use clap::{Args as ClapArgs, CommandFactory, FromArgMatches, Parser, Subcommand};
 use frameless::{Size, ToneMap};
 
 use crate::parse;
@@ -53,6 +53,23 @@ a comparison appears whole or not at all.";
 pub(crate) struct Args {
     #[command(subcommand)]
     pub(crate) command: Option<Command>,
+}
+
+impl Args {
+    /// Those of this program's command line.
+    ///
+    /// # Errors
+    /// If they are none of it, or do not go together.
+    pub(crate) fn checked() -> Result<Args, clap::Error> {
+        let matches = Args::command().try_get_matches()?;
+        let args = Args::from_arg_matches(&matches)?;
+        if let (Some(Command::Bench(bench)), Some((_, given))) =
+            (&args.command, matches.subcommand())
+        {
+            bench.what.check(given)?;
+        }
+        Ok(args)
+    }
 }
 
 #[derive(Subcommand)]

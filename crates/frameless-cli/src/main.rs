@@ -17,14 +17,12 @@ mod view;
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
 use crate::args::{Args, Command, ViewArgs};
 use crate::failure::Failure;
 
 fn main() -> ExitCode {
     logger::start();
-    let result = match Args::try_parse() {
+    let result = match Args::checked() {
         Ok(args) => run(args),
         Err(error) if error.use_stderr() => Err(Failure::of_arguments(&error)),
         Err(help) => output::print_help(&help).map_err(Failure::other),

@@ -2,13 +2,14 @@
 
 use std::path::PathBuf;
 
-use clap::{Args as ClapArgs, ValueEnum};
+use clap::error::ErrorKind;
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Args as ClapArgs, ValueEnum};
 use frameless::Size;
 use frameless_scene::AnimationChoice;
 
 use super::view::DEFAULT_SCENE;
 use super::{ChoiceArgs, LightArgs};
-use crate::failure::Failure;
 use crate::parse;
 
 /// Measure how fast this machine runs the loop
@@ -23,7 +24,17 @@ use crate::parse;
   frameless bench edit --scene model.glb --object Chair --rounds 3
   frameless bench latency --scene model.glb --size 1280x720
   frameless bench sampler --json
-  frameless bench rays --scene generated --rounds 5")]
+  frameless bench rays --scene generated --rounds 5
+
+Options by benchmark, besides --json:
+  engine, sampler, latency  --scene --animation --size --threads --rounds --secs
+  scaling                   --scene --animation --size --rounds --secs
+  load                      --scene --animation --size --threads --rounds
+  edit                      --scene --animation --size --threads --rounds --object
+  still                     --scene --animation --size --threads --rounds --samples
+                            --integrator --max-depth --aperture --focus
+  rays                      --scene --animation --size --rounds --embree
+  display                   --size --threads --rounds --secs")]
 pub(crate) struct BenchArgs {
     /// What to measure
     #[arg(value_enum)]
@@ -104,19 +115,6 @@ impl BenchArgs {
     pub(crate) fn choice(&self) -> ChoiceArgs {
         ChoiceArgs { file_scene: None, animation: self.animation.clone() }
     }
-
-    /// For benchmarks whose scenes are fixed.
-    ///
-    /// # Errors
-    /// If another is asked for.
-    pub(crate) fn no_scene(&self) -> Result<(), Failure> {
-        match &self.scene {
-            Some(scene) => Err(Failure::bad_input(anyhow::anyhow!(
-                "--scene {scene}: this benchmark has scenes of its own; leave --scene out"
-            ))),
-            None => Ok(()),
-        }
-    }
 }
 
 /// The benchmarks.
@@ -140,4 +138,51 @@ pub(crate) enum Benchmark {
     Scaling,
     /// Opening a scene: seconds until its first pixel, and the memory that it takes
     Load,
+}
+
+impl Benchmark {
+    /// Its options, by their ids; beside `json`.
+    fn options(self) -> &'static [&'static str] {
+        match self {
+            Benchmark::Engine | Benchmark::Sampler | Benchmark::Latency => {
+                &["scene", "animation", "size", "threads", "rounds", "secs"]
+            }
+            Benchmark::Scaling => &["scene", "animation", "size", "rounds", "secs"],
+            Benchmark::Load => &["scene", "animation", "size", "threads", "rounds"],
+            Benchmark::Edit => &["scene", "animation", "size", "threads", "rounds", "object"],
+            Benchmark::Still => &[
+                "scene",
+                "animation",
+                "size",
+                "threads",
+                "rounds",
+                "samples",
+                "integrator",
+                "max_depth",
+                "aperture",
+                "focus",
+            ],
+            Benchmark::Rays => &["scene", "animation", "size", "rounds", "embree", "detail"],
+            Benchmark::Display => &["size", "threads", "rounds", "secs"],
+        }
+    }
+
+    /// Refuses options that this benchmark would not heed: who gives one would take the numbers for something that they are not.
+    ///
+    /// # Errors
+    /// If there is one among those given.
+    pub(super) fn check(self, given: &ArgMatches) -> Result<(), clap::Error> {
+        let dashed = |id: &str| format!("--{}", id.replace('_', "-"));
+        let heeds = |id: &str| self.options().contains(&id);
+        let is_given = |id: &str| given.value_source(id) == Some(ValueSource::CommandLine);
+        let all = Benchmark::value_variants().iter().flat_map(|benchmark| benchmark.options());
+        let Some(other) = all.copied().find(|id| is_given(id) && !heeds(id)) else {
+            return Ok(());
+        };
+        let name = self.to_possible_value().map_or_else(String::new, |v| v.get_name().to_owned());
+        let options: Vec<String> = self.options().iter().map(|id| dashed(id)).collect();
+        let (other, options) = (dashed(other), options.join(", "));
+        let text = format!("bench {name} has no {other}; it has {options} and --json");
+        Err(clap::Error::raw(ErrorKind::ArgumentConflict, text))
+    }
 }

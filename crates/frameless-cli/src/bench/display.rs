@@ -35,7 +35,6 @@ const NAME: &str = "display.reproject_gather_ns_per_px";
 /// Nanoseconds per pixel of `Engine::refresh` (warp, gather, holes), each round's median over its refreshes: of each case, and first of
 /// the one that takes most.
 pub(super) fn measure(args: &BenchArgs) -> Result<Vec<Row>, Failure> {
-    args.no_scene()?;
     let conditions = format!(
         "{}×{}, adaptive+reproject, simulated clock at {RATE} samples/s, {REFRESHES_PER_SEC} refreshes/s, one thread; \
          {} rounds of {} s; orbit, sphere, and sphere standing still; \

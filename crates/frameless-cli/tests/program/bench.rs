@@ -59,3 +59,15 @@ fn loading_is_measured_in_processes_of_their_own() {
         assert!(value(&rows, "load.peak_memory_over_content") > 1.0, "{rows:?}");
     }
 }
+
+#[test]
+fn options_that_a_benchmark_would_not_heed_are_refused() {
+    for (arguments, refused) in [
+        (&["scaling", "--threads", "1"][..], "bench scaling has no --threads; it has --scene, "),
+        (&["display", "--scene", "sphere"], "bench display has no --scene; it has --size, "),
+        (&["engine", "--max-depth", "2"], "bench engine has no --max-depth; it has "),
+        (&["rays", "--secs", "1", "--json"], "bench rays has no --secs; it has "),
+    ] {
+        frameless(&[&["bench"], arguments].concat()).refused(2, refused);
+    }
+}
