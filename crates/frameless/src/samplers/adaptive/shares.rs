@@ -243,7 +243,7 @@ impl Shares {
         let blocks = self.credit.lines() as f32;
         let much = if count >= self.tiles as f32 { 2.0 * count / blocks } else { 0.0 };
         self.much = self.at_once.max(much).max(MUCH_STAYS * self.much);
-        let lends = if self.much > self.at_once { self.much / 4.0 * blocks } else { 0.0 };
+        let lends = if self.sweeps() { self.much / 4.0 * blocks } else { 0.0 };
         let given = (count + lends - self.lent).clamp(0.0, 2.0 * count);
         self.lent += given - count;
         let s = given / count;
@@ -274,8 +274,8 @@ impl<W: Weigh> Task for Draw<'_, W> {
     #[inline(always)]
     fn run<U: Unit>(self) {
         let Draw { shares, gives, scale: [a, b], count, weights, tiles } = self;
-        // What those that do not wait leave for the others.
-        let mut left = count - shares.give::<U>(gives);
+        shares.give::<U>(gives);
+        let mut left = if shares.sweeps() { shares.go_on(count) } else { 0.0 };
         for i in 0..shares.due.len() {
             if let Some(&later) = shares.due.get(i + AHEAD) {
                 shares.credit.prefetch(later as usize);
@@ -318,12 +318,24 @@ impl<W: Weigh> Task for Draw<'_, W> {
 }
 
 impl Shares {
-    /// Gives all blocks what they get, and finds those that are drawn from, in their order. Returns what those have that have got much.
+    /// Whether blocks wait for one another.
+    fn sweeps(&self) -> bool {
+        self.much > self.at_once
+    }
+
+    /// Turns the blocks that are drawn from so that those come first where the draw before has not come to. Returns what those that have got much,
+    /// and do not wait, leave of so many draws for the others.
+    fn go_on(&mut self, count: f32) -> f32 {
+        let before = self.due.partition_point(|&block| block < self.next);
+        self.due.rotate_left(before);
+        let got = self.due.iter().map(|&block| self.got[block as usize]);
+        count - got.filter(|&got| got >= self.much).sum::<f32>()
+    }
+
+    /// Gives all blocks what they get, and finds those that are drawn from.
     #[inline(always)]
-    fn give<U: Unit>(&mut self, [a, b]: [f32; 2]) -> f32 {
+    fn give<U: Unit>(&mut self, [a, b]: [f32; 2]) {
         let (a, b, at_once) = (F8::<U>::splat(a), F8::splat(b), F8::splat(self.at_once));
-        let (zero, much) = (F8::splat(0.0), F8::splat(self.much));
-        let mut many = zero;
         self.due.clear();
         for first in (0..self.got.len()).step_by(LANES) {
             let mut due = 0;
@@ -332,14 +344,10 @@ impl Shares {
                 let gets = a * F8::load(&self.weight, blocks) + b * F8::load(&self.even, blocks);
                 let got = F8::load(&self.got, blocks) + gets;
                 got.store(&mut self.got, blocks);
-                many = many + zero.or(got.less_than(much), got);
                 due |= got.less_than(at_once).not().bits() << eight;
             }
             push_bits(&mut self.due, first as u32, due);
         }
-        let before = self.due.partition_point(|&block| block < self.next);
-        self.due.rotate_left(before);
-        many.lanes().iter().sum()
     }
 }
 
