@@ -4,8 +4,8 @@
 //! got ← got + s (a Σ w + b Σ e)     for every block, once per draw of n = a Σ w + b Σ e tiles
 //! of blocks with got ≥ h, and then of those with got ≥ g, all that they have got is drawn until there are n tiles, and got ← 0
 //! g = number of blocks / 100, in [1, 2.8]
-//! h = max(g, 2 n / number of blocks if n is at least the number of tiles, 0.8 h of the draw before)
-//! s: so that h/4 per block is given beforehand, once, where h > g
+//! l = n/2 if n is at least the number of tiles, else 0;  h = max(g, 4 l / number of blocks)
+//! s: so that what l grows by is given beforehand, and held back where it becomes less; if that is more than n, what waits is forgotten
 //! ```
 //!
 //! So what a sweep looks at is a 16th of the tiles: in 4K that takes as long as in small pictures one over all of them. Blocks that get little are
@@ -29,8 +29,6 @@ const LANES: usize = 32;
 const MOST_AT_ONCE: f32 = 2.8;
 /// For every so many blocks (102,400 pixels) it waits for one more.
 const BLOCKS_PER_DRAW: f32 = 100.0;
-/// This part of h stays from draw to draw: where n is small for once, not all that waits is drawn at once.
-const MUCH_STAYS: f32 = 0.8;
 /// How many blocks ahead of the one at hand the next is fetched.
 const AHEAD: usize = 16;
 
@@ -77,7 +75,7 @@ pub(super) struct Shares {
     next: u32,
     /// h.
     much: f32,
-    /// What was given beforehand.
+    /// l: what was given beforehand.
     lent: f32,
     /// Blocks that are drawn from.
     due: Vec<u32>,
@@ -240,21 +238,26 @@ impl Shares {
         if count <= 0.0 || count.is_nan() {
             return;
         }
+        let s = (count + self.lend(count)) / count;
+        let gives = [s * a, s * b];
+        wide::run(Draw { shares: self, gives, scale: [a, b], count, weights, tiles });
+    }
+
+    /// Decides for a draw of so many tiles whether blocks wait for one another, and returns how much they are given beforehand for it: less than
+    /// nothing where they are to wait less.
+    fn lend(&mut self, count: f32) -> f32 {
         let blocks = self.credit.lines() as f32;
-        let much = if count >= self.tiles as f32 { 2.0 * count / blocks } else { 0.0 };
-        self.much = self.at_once.max(much).max(MUCH_STAYS * self.much);
-        let lends = if self.sweeps() { self.much / 4.0 * blocks } else { 0.0 };
-        let given = (count + lends - self.lent).clamp(0.0, 2.0 * count);
-        self.lent += given - count;
-        let s = given / count;
-        wide::run(Draw {
-            shares: self,
-            gives: [s * a, s * b],
-            scale: [a, b],
-            count,
-            weights,
-            tiles,
-        });
+        let lends = if count >= self.tiles as f32 { count / 2.0 } else { 0.0 };
+        if self.lent > lends + count {
+            // Far fewer than before: what waits would be drawn by what was wanted long ago. It is forgotten.
+            let usual = self.at_once / 2.0 * blocks;
+            let keep = ((usual + lends) / self.got.iter().sum::<f32>()).min(1.0);
+            self.got.iter_mut().for_each(|got| *got *= keep);
+            self.lent = lends;
+        }
+        let more = lends - std::mem::replace(&mut self.lent, lends);
+        self.much = self.at_once.max(4.0 * lends / blocks);
+        more
     }
 }
 
@@ -275,7 +278,7 @@ impl<W: Weigh> Task for Draw<'_, W> {
     fn run<U: Unit>(self) {
         let Draw { shares, gives, scale: [a, b], count, weights, tiles } = self;
         shares.give::<U>(gives);
-        let mut left = if shares.sweeps() { shares.go_on(count) } else { 0.0 };
+        let mut left = if shares.lent > 0.0 { shares.go_on(count) } else { 0.0 };
         for i in 0..shares.due.len() {
             if let Some(&later) = shares.due.get(i + AHEAD) {
                 shares.credit.prefetch(later as usize);
@@ -318,11 +321,6 @@ impl<W: Weigh> Task for Draw<'_, W> {
 }
 
 impl Shares {
-    /// Whether blocks wait for one another.
-    fn sweeps(&self) -> bool {
-        self.much > self.at_once
-    }
-
     /// Turns the blocks that are drawn from so that those come first where the draw before has not come to. Returns what those that have got much,
     /// and do not wait, leave of so many draws for the others.
     fn go_on(&mut self, count: f32) -> f32 {
@@ -427,6 +425,50 @@ mod tests {
                 let off = counts[tile] + waits(block) * part - draws * want;
                 assert!(off.abs() < 2.0 + 1e-4 * counts[tile], "{tile} of {tiles}: off by {off}");
             }
+        }
+    }
+
+    #[test]
+    fn draws_stay_what_they_are_where_they_become_few_or_many_at_once() {
+        for seed in 0..4 {
+            let mut rng = Rng::new(seed);
+            let mut shares = Weighed::new(3072, &mut rng);
+            let weights: Vec<f32> = (0..3072).map(|_| weight(&mut rng)).collect();
+            shares.set_all(|tile| (weights[tile], 1.0));
+            let mut counts = vec![0.0; 3072];
+            for (count, turns) in [(10.0, 50), (5000.0, 50), (10.0, 2000), (1e6, 3), (938.0, 2000)]
+            {
+                let scale = scale(&mut shares, count);
+                let mut sum = 0;
+                for turn in 0..turns {
+                    let drawn = drawn(&mut shares, scale, &mut counts);
+                    // Half of what all blocks wait for may be there at once.
+                    assert!(drawn as f64 <= 2.0 * count + 184.0, "{drawn} for {count}, {turn}");
+                    sum += drawn;
+                }
+                let wanted = count * f64::from(turns);
+                let off = (sum as f64 - wanted).abs();
+                assert!(off < 0.5 * count + 0.05 * wanted + 3072.0, "{sum} for {wanted}");
+            }
+            assert_eq!(shares.0.lent, 0.0, "938 tiles are not many enough");
+        }
+    }
+
+    #[test]
+    fn nobody_is_forgotten_where_draws_are_many_and_few_by_turns() {
+        let mut rng = Rng::new(17);
+        let mut shares = Weighed::new(3072, &mut rng);
+        shares.set_all(|_| (1.0, 1.0));
+        let mut counts = vec![0.0; 3072];
+        for _ in 0..400 {
+            for count in [5000.0, 10.0] {
+                let scale = scale(&mut shares, count);
+                drawn(&mut shares, scale, &mut counts);
+            }
+        }
+        let mean = counts.iter().sum::<f64>() / 3072.0;
+        for (tile, count) in counts.iter().enumerate() {
+            assert!((count / mean - 1.0).abs() < 0.1, "{tile}: {count} of {mean}");
         }
     }
 
