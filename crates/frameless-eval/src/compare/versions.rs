@@ -34,7 +34,7 @@ impl Family {
         match self {
             Family::Frames => 1,
             Family::Held => 1,
-            Family::Adaptive => 10,
+            Family::Adaptive => 9,
         }
     }
 }

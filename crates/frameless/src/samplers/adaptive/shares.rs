@@ -1,22 +1,15 @@
 //! Tiles drawn in proportion to their shares, exactly on average: of every [block](super::block) of 16, and then of the tiles in it.
 //!
 //! ```text
-//! got ← got + s (a Σ w + b Σ e)     for every block, once per draw of n = a Σ w + b Σ e tiles
-//! of blocks with got ≥ h, and then of those with got ≥ g, all that they have got is drawn until there are n tiles, and got ← 0
+//! got ← got + a · Σ w + b · Σ e     for every block, once per draw of a Σ w + b Σ e tiles
+//! if got ≥ g:   that many tiles of the block are drawn, got ← 0
 //! g = number of blocks / 100, in [1, 2.8]
-//! l = n/2 if n is at least the number of tiles, else 0;  h = max(g, 4 l / number of blocks)
-//! s: so that what l grows by is given beforehand, and held back where it becomes less; if that is more than n, what waits is forgotten
 //! ```
 //!
 //! So what a sweep looks at is a 16th of the tiles: in 4K that takes as long as in small pictures one over all of them. Blocks that get little are
-//! left alone meanwhile, and those drawn from are looked at once for several tiles. In large pictures they wait for two or three, since each look at a
-//! block waits for memory. More at a time would be faster still, but then what a block has got is shared out by weights that have changed meanwhile.
-//!
-//! Where a draw has a tile or more for each that there is, as with a fast renderer on the real clock, blocks with less than h are drawn from in the order
-//! of the picture, from where the draw before has ended on, and what was given beforehand has them wait for one another: a draw is about a sweep over
-//! two thirds of them. So its samples lie closer together: their rays meet the same nodes, and what is known of their tiles is in the cache. Blocks that
-//! get much wait for nobody. With fewer tiles per draw waiting would be felt: what changes would be seen later by a part of the time that it takes to
-//! look at it at all.
+//! left alone meanwhile, and those drawn from are looked at once for several tiles. In small pictures most blocks have a draw or two per batch
+//! in any case; in large ones they wait for two or three, since each look at a block waits for memory. More at a time would be faster still, but then what
+//! a block has got is shared out by weights that have changed meanwhile.
 
 use super::block::{BLOCK, Due, push_bits, sum};
 use crate::Rng;
@@ -71,12 +64,6 @@ pub(super) struct Shares {
     even_sum: f64,
     /// g.
     at_once: f32,
-    /// The first block of the next draw.
-    next: u32,
-    /// h.
-    much: f32,
-    /// l: what was given beforehand.
-    lent: f32,
     /// Blocks that are drawn from.
     due: Vec<u32>,
     /// Blocks of which a weight is another one now, room for all, and how many there are.
@@ -118,9 +105,6 @@ impl Shares {
             even,
             even_sum: 0.0,
             at_once,
-            next: 0,
-            much: 0.0,
-            lent: 0.0,
             due: Vec::new(),
             touched: vec![0; blocks + 1],
             count_touched: 0,
@@ -233,42 +217,15 @@ impl Shares {
 
     /// Appends the tiles that are drawn: a Σ w + b Σ e of them on average.
     pub(super) fn draw(&mut self, a: f32, b: f32, weights: &impl Weigh, tiles: &mut Vec<u32>) {
-        let sums = self.sums();
-        let count = a * sums.weight as f32 + b * sums.even as f32;
-        if count <= 0.0 || count.is_nan() {
-            return;
-        }
-        let s = (count + self.lend(count)) / count;
-        let gives = [s * a, s * b];
-        wide::run(Draw { shares: self, gives, scale: [a, b], count, weights, tiles });
-    }
-
-    /// Decides for a draw of so many tiles whether blocks wait for one another, and returns how much they are given beforehand for it: less than
-    /// nothing where they are to wait less.
-    fn lend(&mut self, count: f32) -> f32 {
-        let blocks = self.credit.lines() as f32;
-        let lends = if count >= self.tiles as f32 { count / 2.0 } else { 0.0 };
-        if self.lent > lends + count {
-            // Far fewer than before: what waits would be drawn by what was wanted long ago. It is forgotten.
-            let usual = self.at_once / 2.0 * blocks;
-            let keep = ((usual + lends) / self.got.iter().sum::<f32>()).min(1.0);
-            self.got.iter_mut().for_each(|got| *got *= keep);
-            self.lent = lends;
-        }
-        let more = lends - std::mem::replace(&mut self.lent, lends);
-        self.much = self.at_once.max(4.0 * lends / blocks);
-        more
+        wide::run(Draw { shares: self, a, b, weights, tiles });
     }
 }
 
 /// See [`Shares::draw`].
 struct Draw<'a, W> {
     shares: &'a mut Shares,
-    /// s a, s b.
-    gives: [f32; 2],
-    scale: [f32; 2],
-    /// n.
-    count: f32,
+    a: f32,
+    b: f32,
     weights: &'a W,
     tiles: &'a mut Vec<u32>,
 }
@@ -276,9 +233,8 @@ struct Draw<'a, W> {
 impl<W: Weigh> Task for Draw<'_, W> {
     #[inline(always)]
     fn run<U: Unit>(self) {
-        let Draw { shares, gives, scale: [a, b], count, weights, tiles } = self;
-        shares.give::<U>(gives);
-        let mut left = if shares.lent > 0.0 { shares.go_on(count) } else { 0.0 };
+        let Draw { shares, a, b, weights, tiles } = self;
+        shares.give::<U>(a, b);
         for i in 0..shares.due.len() {
             if let Some(&later) = shares.due.get(i + AHEAD) {
                 shares.credit.prefetch(later as usize);
@@ -288,17 +244,6 @@ impl<W: Weigh> Task for Draw<'_, W> {
                 }
             }
             let block = shares.due[i] as usize;
-            let has = shares.got[block];
-            let mut got = has;
-            if has < shares.much {
-                if left <= 0.0 {
-                    continue;
-                }
-                got = has.min(left);
-                left -= got;
-                shares.next = block as u32 + u32::from(got == has);
-            }
-            shares.got[block] = has - got;
             // Who is not there is never drawn, whatever its weight.
             let [w_left, w_right] = weights.halves::<U>(block);
             let (per_weight, per_even) = (F8::splat(a), F8::splat(b));
@@ -310,7 +255,7 @@ impl<W: Weigh> Task for Draw<'_, W> {
                 }
             };
             let due = Due {
-                got,
+                got: std::mem::take(&mut shares.got[block]),
                 shares: [per_weight * w_left + e_left, per_weight * w_right + e_right],
                 sum: a * shares.weight[block] + b * shares.even[block],
                 first: (block * BLOCK) as u32,
@@ -321,18 +266,9 @@ impl<W: Weigh> Task for Draw<'_, W> {
 }
 
 impl Shares {
-    /// Turns the blocks that are drawn from so that those come first where the draw before has not come to. Returns what those that have got much,
-    /// and do not wait, leave of so many draws for the others.
-    fn go_on(&mut self, count: f32) -> f32 {
-        let before = self.due.partition_point(|&block| block < self.next);
-        self.due.rotate_left(before);
-        let got = self.due.iter().map(|&block| self.got[block as usize]);
-        count - got.filter(|&got| got >= self.much).sum::<f32>()
-    }
-
     /// Gives all blocks what they get, and finds those that are drawn from.
     #[inline(always)]
-    fn give<U: Unit>(&mut self, [a, b]: [f32; 2]) {
+    fn give<U: Unit>(&mut self, a: f32, b: f32) {
         let (a, b, at_once) = (F8::<U>::splat(a), F8::splat(b), F8::splat(self.at_once));
         self.due.clear();
         for first in (0..self.got.len()).step_by(LANES) {
@@ -410,87 +346,11 @@ mod tests {
             let weights: Vec<f32> = (0..tiles).map(|_| weight(&mut rng)).collect();
             shares.set_all(|tile| (weights[tile], 1.0));
             let (scale, mut counts) = (scale(&mut shares, 500.0), vec![0.0; tiles]);
-            let waited = shares.0.got.clone();
             (0..400).for_each(|_| _ = drawn(&mut shares, scale, &mut counts));
-            let all = shares.all(scale.0, scale.1);
-            let per_block: Vec<f32> = all.chunks(BLOCK).map(|block| block.iter().sum()).collect();
-            // What a block waits for counts as if it had been drawn.
-            let waits = |block: usize| f64::from(shares.0.got[block] - waited[block]);
-            let waiting: f64 = (0..per_block.len()).map(waits).sum();
-            let draws = (counts.iter().sum::<f64>() + waiting) / 500.0;
-            assert!((draws - 400.0).abs() < 1.5, "{tiles}: {draws}");
-            for (tile, want) in all.into_iter().map(f64::from).enumerate() {
-                let block = tile / BLOCK;
-                let part = want / f64::from(per_block[block]);
-                let off = counts[tile] + waits(block) * part - draws * want;
+            for (tile, want) in shares.all(scale.0, scale.1).into_iter().enumerate() {
+                let off = counts[tile] - 400.0 * f64::from(want);
                 assert!(off.abs() < 2.0 + 1e-4 * counts[tile], "{tile} of {tiles}: off by {off}");
             }
-        }
-    }
-
-    #[test]
-    fn draws_stay_what_they_are_where_they_become_few_or_many_at_once() {
-        for seed in 0..4 {
-            let mut rng = Rng::new(seed);
-            let mut shares = Weighed::new(3072, &mut rng);
-            let weights: Vec<f32> = (0..3072).map(|_| weight(&mut rng)).collect();
-            shares.set_all(|tile| (weights[tile], 1.0));
-            let mut counts = vec![0.0; 3072];
-            for (count, turns) in [(10.0, 50), (5000.0, 50), (10.0, 2000), (1e6, 3), (938.0, 2000)]
-            {
-                let scale = scale(&mut shares, count);
-                let mut sum = 0;
-                for turn in 0..turns {
-                    let drawn = drawn(&mut shares, scale, &mut counts);
-                    // Half of what all blocks wait for may be there at once.
-                    assert!(drawn as f64 <= 2.0 * count + 184.0, "{drawn} for {count}, {turn}");
-                    sum += drawn;
-                }
-                let wanted = count * f64::from(turns);
-                let off = (sum as f64 - wanted).abs();
-                assert!(off < 0.5 * count + 0.05 * wanted + 3072.0, "{sum} for {wanted}");
-            }
-            assert_eq!(shares.0.lent, 0.0, "938 tiles are not many enough");
-        }
-    }
-
-    #[test]
-    fn nobody_is_forgotten_where_draws_are_many_and_few_by_turns() {
-        let mut rng = Rng::new(17);
-        let mut shares = Weighed::new(3072, &mut rng);
-        shares.set_all(|_| (1.0, 1.0));
-        let mut counts = vec![0.0; 3072];
-        for _ in 0..400 {
-            for count in [5000.0, 10.0] {
-                let scale = scale(&mut shares, count);
-                drawn(&mut shares, scale, &mut counts);
-            }
-        }
-        let mean = counts.iter().sum::<f64>() / 3072.0;
-        for (tile, count) in counts.iter().enumerate() {
-            assert!((count / mean - 1.0).abs() < 0.1, "{tile}: {count} of {mean}");
-        }
-    }
-
-    #[test]
-    fn a_draw_goes_on_where_the_one_before_has_ended() {
-        let (tiles, mut rng) = (3072, Rng::new(13));
-        let mut shares = Weighed::new(tiles, &mut rng);
-        shares.set_all(|_| (1.0, 1.0));
-        let scale = scale(&mut shares, 938.0);
-        let mut draw = || {
-            let mut tiles = Vec::new();
-            shares.0.draw(scale.0, scale.1, &shares.1, &mut tiles);
-            tiles
-        };
-        (0..20).for_each(|_| _ = draw());
-        let mut end = draw().last().copied();
-        for _ in 0..20 {
-            let (drawn, before) = (draw(), end);
-            end = drawn.last().copied();
-            let (first, before) = (drawn[0] / BLOCK as u32, before.expect("a tile") / BLOCK as u32);
-            assert!(first == before || first == (before + 1) % 192, "{first} after {before}");
-            assert!(drawn.len().abs_diff(938) < 100, "{}", drawn.len());
         }
     }
 
