@@ -644,7 +644,8 @@ impl<T: Tracer> Engine<T> {
         self.sampler.rates().filter(|rates| rates.size() == self.canvas.size())
     }
 
-    /// What the sampler was told of the newest answer; empty if none has come in the last turn of the loop.
+    /// What the sampler was told last in the last turn of the loop; empty if nothing. That is of the newest answer, but after a picture that
+    /// was made beside the loop of answers that came meanwhile.
     pub fn observations(&self) -> &[Observation] {
         &self.observations
     }

@@ -12,29 +12,21 @@ use super::view::DEFAULT_SCENE;
 use super::{ChoiceArgs, LightArgs};
 use crate::parse;
 
+const EXAMPLES: &str = "Examples:
+  frameless bench engine
+  frameless bench engine --scene model.glb --threads 1
+  frameless bench edit --scene model.glb --object Chair --rounds 3
+  frameless bench latency --scene model.glb --size 1280x720
+  frameless bench sampler --json
+  frameless bench rays --scene generated --rounds 5";
+
 /// Measure how fast this machine runs the loop
 ///
 /// Speeds are measured in alternating rounds of one run, and given as medians with the smallest and the
 /// largest round. Close other programs first.
 #[derive(ClapArgs)]
 #[command(args_override_self = true)]
-#[command(after_help = "Examples:
-  frameless bench engine
-  frameless bench engine --scene model.glb --threads 1
-  frameless bench edit --scene model.glb --object Chair --rounds 3
-  frameless bench latency --scene model.glb --size 1280x720
-  frameless bench sampler --json
-  frameless bench rays --scene generated --rounds 5
-
-Options by benchmark, besides --json:
-  engine, sampler, latency  --scene --animation --size --threads --rounds --secs
-  scaling                   --scene --animation --size --rounds --secs
-  load                      --scene --animation --size --threads --rounds
-  edit                      --scene --animation --size --threads --rounds --object
-  still                     --scene --animation --size --threads --rounds --samples
-                            --integrator --max-depth --aperture --focus
-  rays                      --scene --animation --size --rounds --embree
-  display                   --size --threads --rounds --secs")]
+#[command(after_help = after_help())]
 pub(crate) struct BenchArgs {
     /// What to measure
     #[arg(value_enum)]
@@ -140,31 +132,43 @@ pub(crate) enum Benchmark {
     Load,
 }
 
+/// Examples, and which benchmark heeds which options.
+fn after_help() -> String {
+    let lines = Benchmark::value_variants().iter().map(|benchmark| {
+        let options: Vec<String> = benchmark.options().map(dashed).collect();
+        format!("\n  {:8} {}", benchmark.name(), options.join(" "))
+    });
+    format!("{EXAMPLES}\n\nOptions by benchmark, besides --json:{}", lines.collect::<String>())
+}
+
+/// An option as it is written.
+fn dashed(id: &str) -> String {
+    format!("--{}", id.replace('_', "-"))
+}
+
 impl Benchmark {
-    /// Its options, by their ids; beside `json`.
-    fn options(self) -> &'static [&'static str] {
-        match self {
-            Benchmark::Engine | Benchmark::Sampler | Benchmark::Latency => {
-                &["scene", "animation", "size", "threads", "rounds", "secs"]
+    fn name(self) -> String {
+        let value = self.to_possible_value().expect("none of them is hidden");
+        value.get_name().to_owned()
+    }
+
+    /// The ids of the options that it heeds, beside `json`, and beside `detail` of `rays`, which is for tests.
+    fn options(self) -> impl Iterator<Item = &'static str> {
+        let common = match self {
+            Benchmark::Display => "size rounds",
+            _ => "scene animation size rounds",
+        };
+        let own = match self {
+            Benchmark::Engine | Benchmark::Sampler | Benchmark::Latency | Benchmark::Display => {
+                "threads secs"
             }
-            Benchmark::Scaling => &["scene", "animation", "size", "rounds", "secs"],
-            Benchmark::Load => &["scene", "animation", "size", "threads", "rounds"],
-            Benchmark::Edit => &["scene", "animation", "size", "threads", "rounds", "object"],
-            Benchmark::Still => &[
-                "scene",
-                "animation",
-                "size",
-                "threads",
-                "rounds",
-                "samples",
-                "integrator",
-                "max_depth",
-                "aperture",
-                "focus",
-            ],
-            Benchmark::Rays => &["scene", "animation", "size", "rounds", "embree", "detail"],
-            Benchmark::Display => &["size", "threads", "rounds", "secs"],
-        }
+            Benchmark::Scaling => "secs",
+            Benchmark::Load => "threads",
+            Benchmark::Edit => "threads object",
+            Benchmark::Still => "threads samples integrator max_depth aperture focus",
+            Benchmark::Rays => "embree",
+        };
+        common.split(' ').chain(own.split(' '))
     }
 
     /// Refuses options that this benchmark would not heed: who gives one would take the numbers for something that they are not.
@@ -172,16 +176,12 @@ impl Benchmark {
     /// # Errors
     /// If there is one among those given.
     pub(super) fn check(self, given: &ArgMatches) -> Result<(), clap::Error> {
-        let dashed = |id: &str| format!("--{}", id.replace('_', "-"));
-        let heeds = |id: &str| self.options().contains(&id);
+        let heeds = |id: &str| self.options().any(|heeded| heeded == id);
         let is_given = |id: &str| given.value_source(id) == Some(ValueSource::CommandLine);
-        let all = Benchmark::value_variants().iter().flat_map(|benchmark| benchmark.options());
-        let Some(other) = all.copied().find(|id| is_given(id) && !heeds(id)) else {
-            return Ok(());
-        };
-        let name = self.to_possible_value().map_or_else(String::new, |v| v.get_name().to_owned());
-        let options: Vec<String> = self.options().iter().map(|id| dashed(id)).collect();
-        let (other, options) = (dashed(other), options.join(", "));
+        let mut all = Benchmark::value_variants().iter().flat_map(|benchmark| benchmark.options());
+        let Some(other) = all.find(|id| is_given(id) && !heeds(id)) else { return Ok(()) };
+        let options: Vec<String> = self.options().map(dashed).collect();
+        let (name, other, options) = (self.name(), dashed(other), options.join(", "));
         let text = format!("bench {name} has no {other}; it has {options} and --json");
         Err(clap::Error::raw(ErrorKind::ArgumentConflict, text))
     }
