@@ -107,3 +107,64 @@ impl Replaced {
         Kept { now, size, requests, new, old, surfaces, is_noisy }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ticks of a canvas's times.
+    const TICK: u64 = 1 << 14;
+
+    fn answer(ticks: u64, requests: &[Request]) -> Answer {
+        let (now, size) = (Time(ticks * TICK), Size::new(4, 1));
+        let surface = |request: &Request| Surface { object: request.pixel, ..Surface::default() };
+        Answer {
+            batch: 0,
+            now,
+            scene_secs: 0.0,
+            size,
+            requests: requests.to_vec(),
+            rgb: requests.iter().map(|request| [ticks as f32 + request.pixel as f32; 3]).collect(),
+            surfaces: requests.iter().map(surface).collect(),
+        }
+    }
+
+    fn put(answer: &mut Answer, count: usize, canvas: &mut Canvas) -> (Replaced, usize) {
+        let mut replaced = Replaced::default();
+        let late = replaced.put(answer, count, canvas);
+        (replaced, late)
+    }
+
+    #[test]
+    fn what_comes_too_late_is_left_out_of_everything() {
+        let mut canvas = Canvas::from_picture(Size::new(4, 1), vec![[0.5; 3]; 4]);
+        put(&mut answer(10, &[Request::centre(1)]), 1, &mut canvas);
+        let (replaced, late) =
+            put(&mut answer(5, &[0, 1, 2, 3].map(Request::centre)), 3, &mut canvas);
+        assert_eq!(late, 1);
+        assert_eq!(replaced.requests, [0, 2].map(Request::centre), "and the fourth is not wanted");
+        assert_eq!(
+            (&replaced.new[..], &replaced.old[..]),
+            (&[[5.0; 3], [7.0; 3]][..], &[[0.5; 3]; 2][..])
+        );
+        let objects: Vec<u32> = replaced.surfaces.iter().map(|surface| surface.object).collect();
+        assert_eq!((objects, Vec::from_iter(replaced.newest())), (vec![0, 2], vec![0, 2]));
+        let told: Vec<_> = replaced.told.iter().map(|t| (t.pixel, t.now.0, t.previous.0)).collect();
+        assert_eq!(told, [(0, 5 * TICK, 0), (2, 5 * TICK, 0)]);
+        assert_eq!(canvas.rgb(), [[5.0; 3], [11.0; 3], [7.0; 3], [0.5; 3]]);
+        let times: Vec<u64> = canvas.time().map(|time| time.0 / TICK).collect();
+        assert_eq!(times, [5, 10, 5, 0]);
+    }
+
+    #[test]
+    fn what_is_added_to_others_replaces_nothing() {
+        let mut canvas = Canvas::from_picture(Size::new(4, 1), vec![[0.5; 3]; 4]);
+        canvas.set_samples(16, &[0, 1, 1, 0]);
+        let further = [0, 1].map(|pixel| Request::in_sequence(pixel, 3));
+        let requests = [further[0], further[1], Request::centre(2)];
+        let (replaced, late) = put(&mut answer(9, &requests), 3, &mut canvas);
+        assert_eq!((late, Vec::from_iter(replaced.newest())), (0, vec![0, 2]), "0 does not rest");
+        assert_eq!(canvas.rgb(), [[9.0; 3], [0.5; 3], [11.0; 3], [0.5; 3]]);
+        assert_eq!(canvas.samples(), [0, 2, 1, 0]);
+    }
+}
