@@ -161,9 +161,11 @@ mod tests {
         let mut canvas = Canvas::from_picture(Size::new(4, 1), vec![[0.5; 3]; 4]);
         canvas.set_samples(16, &[0, 1, 1, 0]);
         let further = [0, 1].map(|pixel| Request::in_sequence(pixel, 3));
-        let requests = [further[0], further[1], Request::centre(2)];
+        let requests = [further[0], further[1], Request::centre(2), Request::centre(3)];
         let (replaced, late) = put(&mut answer(9, &requests), 3, &mut canvas);
         assert_eq!((late, Vec::from_iter(replaced.newest())), (0, vec![0, 2]), "0 does not rest");
+        let lengths = [replaced.requests.len(), replaced.new.len(), replaced.surfaces.len()];
+        assert_eq!(lengths, [3; 3], "the fourth is not wanted");
         assert_eq!(canvas.rgb(), [[9.0; 3], [0.5; 3], [11.0; 3], [0.5; 3]]);
         assert_eq!(canvas.samples(), [0, 2, 1, 0]);
     }
